@@ -14,19 +14,20 @@ from mrdamper.dampers.model_file import dump_model, parse_model
 from mrdamper.dampers.published import all_published, conditioned_type
 from mrdamper.dampers.streaming import stepper
 from mrdamper.data import Condition, Dataset, Run
-from mrdamper.errors import IdentificationError, ModelFileError, UnknownNameError
+from mrdamper.errors import IdentificationError, InputError, ModelFileError, UnknownNameError
 from mrdamper.exporters.equations import equations
 from mrdamper.identification import identify
 from mrdamper.models import all_models
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.models.play_bypass import PlayBypass
 from mrdamper.models.spencer import Spencer
+from mrdamper.paper.options import PaperOptions
 from mrdamper.physics.motion import random_motion, sine
 from mrdamper.physics.simulation import simulate
 from mrdamper.report.comparison import summary_rows, write_comparison
 from mrdamper.study.comparison import compare
 from mrdamper.study.parallel import shortened
-from mrdamper.study.recipe import recipes
+from mrdamper.study.recipe import recipes, recipes_of_models
 from mrdamper.study.validation import validate
 
 ALI = {  # of a plausible damper; identifying one takes a minute
@@ -130,6 +131,24 @@ def test_unknown_models_are_named_with_near_ones(dataset):
 def test_too_few_runs_are_refused(dataset):
     with pytest.raises(IdentificationError, match="fewer than three identification runs"):
         compare(dataset.only(dataset.runs[:2]), ["bingham"])
+
+
+def test_options_without_effect_are_refused(dataset, tmp_path):
+    searches = ["bouc-wen:paper", "bouc-wen:direct-genetic"]
+    assert [c.name for c in recipes(["kwok", "bouc-wen"], genetic=True)] == ["kwok", "bouc-wen", *searches]
+    with pytest.raises(InputError, match="no genetic search of kwok; the models with one: bouc-wen"):
+        recipes(["kwok"], genetic=True)
+    with pytest.raises(InputError, match="options of the model paper, which is not compared"):
+        compare(dataset, ["kwok"], method=PaperOptions())
+    words = ["compare", "--out", str(tmp_path / "out"), "--models", "bouc-wen", "--set", "n=3"]
+    refused = CliRunner().invoke(application(), words).exception
+    assert "options of the model paper" in str(refused)
+
+
+def test_a_model_is_compared_in_each_of_its_ways_as_a_study_fits_it():
+    ways = ["bouc-wen", "bouc-wen:joint", "bouc-wen:current"]
+    assert recipes_of_models(["bouc-wen", "bouc-wen:joint", "kernel"]) == [*ways, "kernel"]
+    assert recipes_of_models(["dahl", "kwock"]) == ["dahl", "dahl:joint", "kwock"]
 
 
 def test_genetic_entries_take_part_only_when_asked():

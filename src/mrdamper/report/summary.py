@@ -112,9 +112,12 @@ def _rig_lines(rig: RigStudy, shown: int, *, verbose: bool) -> tuple[list[str], 
     if rig.calibration is not None:
         lines.append(f"  {rig.calibration.summary}")
     others = rig.candidates[1:]
-    for other in others if verbose else others[:1]:
+    same_model = [c for c in others[1:] if rig.asked_for and c.recipe.model == chosen.recipe.model]
+    for other in others if verbose else [*others[:1], *same_model]:
+        is_better = rig.asked_for and other.cross_validated.median() < chosen.cross_validated.median()
+        label = "smaller error" if is_better else "compared" if other in same_model else "next best"
         lines.append(
-            f"  {'compared' if verbose else 'next best'}: {other.title}, {other.damper.parameter_count} parameters, "
+            f"  {'compared' if verbose else label}: {other.title}, {other.damper.parameter_count} parameters, "
             f"{_errors('cross-validation', other.cross_validated)}{_why_not(rig, other)}"
         )
     if verbose:
@@ -133,7 +136,8 @@ def _rig_lines(rig: RigStudy, shown: int, *, verbose: bool) -> tuple[list[str], 
 def _why_not(rig: RigStudy, other: RecipeResult) -> str:
     """State why a model with a smaller cross-validation error over conditions is not the selected one."""
     chosen = rig.chosen
-    if rig.asked_for or not other.cross_validated.median() < chosen.cross_validated.median():
+    is_open = not rig.asked_for or other.recipe.model == chosen.recipe.model
+    if not is_open or not other.cross_validated.median() < chosen.cross_validated.median():
         return ""
     if other.recipe.name in rig.refused:
         return f"; not eligible: {rig.refused[other.recipe.name]}"

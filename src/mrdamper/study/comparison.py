@@ -92,9 +92,10 @@ def compare(
     ----------
     dataset : Dataset
     names : sequence of str
-        Models; default all but the genetic ones.
+        Models, each with its individual fits, or one of their other ways ("bouc-wen:joint"); default all but the
+        genetic ones.
     genetic : bool
-        Include identification by genetic algorithm.
+        Include identification by genetic algorithm; of the named models, where some are named.
     method : StudyMethod, optional
         Options of a published method, as the gas spring and presets of `PaperOptions`.
     jobs : int, optional
@@ -105,6 +106,8 @@ def compare(
     ------
     UnknownNameError
         If there is no such model.
+    InputError
+        E_OPTION, if the named models have no genetic search, or `method` is none of them.
     IdentificationError
         If a rig has too few train sines, and no record of other motion.
 

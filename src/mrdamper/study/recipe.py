@@ -344,14 +344,36 @@ def catalogue(method: StudyMethod | None = None) -> Mapping[str, Recipe]:
 def recipes(names: Sequence[str] = (), genetic: bool = False, method: StudyMethod | None = None) -> list[Recipe]:
     """Recipes of some names, or all; raises `UnknownNameError` with the near matches.
 
-    Those by genetic algorithms, which take most of the time, are included if `genetic`. `method` is a published method
-    with options, in place of its own defaults.
+    Those by genetic algorithms, which take most of the time, are included if `genetic`: of the named models, where some
+    are named. `method` is a published method with options, in place of its own defaults. Raises `InputError` (E_OPTION)
+    if the named models have no genetic search, or do not follow that method.
     """
     by_name = catalogue(method)
     for name in names:
         if name not in by_name:
             raise UnknownNameError.of("model", name, by_name)
+    if genetic and names:
+        models = {by_name[name].model for name in names}
+        searches = [name for name, recipe in by_name.items() if recipe.on_request and recipe.model in models]
+        if not searches:
+            there = ", ".join(dict.fromkeys(recipe.model for recipe in by_name.values() if recipe.on_request))
+            remedy = f"the models with one: {there}; compare these, too, or omit --genetic"
+            raise InputError(f"no genetic search of {', '.join(names)}", remedy=remedy, code="E_OPTION")
+        names = [*names, *searches]
+    if method is not None and names and method.name not in names:
+        remedy = f"compare the model {method.name}, too, or omit the options"
+        raise InputError(f"options of the model {method.name}, which is not compared", remedy=remedy, code="E_OPTION")
     return [by_name[name] for name in (names or by_name) if names or genetic or not by_name[name].on_request]
+
+
+def recipes_of_models(names: Sequence[str]) -> list[str]:
+    """Return the names of all recipes of some models, as a study follows them; the name of a recipe is kept."""
+    by_name = catalogue()
+    chosen = [
+        [r.name for r in by_name.values() if name == r.name or (name == r.model and not r.on_request)] or [name]
+        for name in names
+    ]
+    return list(dict.fromkeys(name for some in chosen for name in some))
 
 
 def recipes_of_study(

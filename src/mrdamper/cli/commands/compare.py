@@ -24,7 +24,9 @@ app = typer.Typer()
 def compare(
     data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests of two dampers."),
     out: Path = typer.Option(..., help="Folder for comparison.html, tables and figures."),
-    models: list[str] = typer.Option([], help="Only this model; may be repeated. Default: all."),
+    models: list[str] = typer.Option(
+        [], help="Only this model in all its ways (bouc-wen), or one of them (bouc-wen:joint); may be repeated."
+    ),
     genetic: bool = typer.Option(
         False, "--genetic", help="Also identify by genetic algorithm, 60 generations (minutes)."
     ),
@@ -48,18 +50,20 @@ def compare(
     from mrdamper.report.comparison import summary_rows, write_comparison
     from mrdamper.rig_files.dataset_folder import load_dataset
     from mrdamper.study import comparison as comparing
-    from mrdamper.study.recipe import recipes, study_method
+    from mrdamper.study.recipe import recipes, recipes_of_models, study_method
 
     require_writable(out)
-    names = [name.strip() for entry in models for name in entry.split(",") if name.strip()]
-    recipes(names)  # refuses unknown names before anything is read
+    names = recipes_of_models([name.strip() for entry in models for name in entry.split(",") if name.strip()])
+    options = (parse_pairs(setting, "--set"), parse_gas(gas)) if setting or gas else ()
+    method = study_method("paper", *options) if options else None
+    recipes(names, genetic, method)  # refuses what cannot be compared before anything is read
     dataset = load_dataset(data)
     with progress_on_stderr() as progress:
         result = comparing.compare(
             dataset,
             names,
             genetic=genetic,
-            method=study_method("paper", parse_pairs(setting, "--set"), parse_gas(gas)),
+            method=method,
             jobs=jobs,
             progress=lambda what, share: progress(what, 0.9 * share),
         )

@@ -26,7 +26,9 @@ def study(
     data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests of two dampers."),
     out: Path = typer.Option(..., help="Folder for report.html, model.json, tables and figures."),
     model: str | None = typer.Option(
-        None, help="Save this model instead of the best one; paper: the method of Qian et al. 2024."
+        None,
+        help="Save this model in the best of its ways, or in one of them (dahl:joint), instead of the best model; "
+        "paper: the method of Qian et al. 2024.",
     ),
     gas: str | None = typer.Option(
         None, help="Known gas spring for --model paper: pressure MPa, volume cm3, rod area mm2, as P,V,A."
