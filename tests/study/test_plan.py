@@ -154,7 +154,7 @@ def test_a_plan_says_what_its_numbers_are(reckoning, damper):
     whole = [t * np.sqrt(s**2 + reckoning.beside) for s in (before, after)]
     text = reckoning.summary(made)
     assert f"±{t * before:.1f} -> ±{t * after:.1f} % from the parameters" in text
-    assert f"±{whole[0]:.1f} -> ±{whole[1]:.1f} % with a future session and model error" in text
+    assert f"±{whole[0]:.1f} -> ±{whole[1]:.1f} % with a future session and the model error at tests" in text
     own = design(damper, "c1").proposals([[0], [1]])
     shown = f"standard error of c1 {100 * own[0].before:.1f} -> {100 * own[-1].after:.1f} % of its value"
     assert design(damper, "c1").summary(own) == shown

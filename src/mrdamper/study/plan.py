@@ -239,7 +239,7 @@ class ExperimentDesign:
         return (
             f"{100 * _LEVEL:g} % prediction interval of the force {self.about}, relative to the peak force: "
             f"±{parameters[0]:.1f} -> ±{parameters[1]:.1f} % from the parameters; "
-            f"±{total[0]:.1f} -> ±{total[1]:.1f} % with a future session and model error"
+            f"±{total[0]:.1f} -> ±{total[1]:.1f} % with a future session and the model error at tests"
         )
 
 
