@@ -1,5 +1,6 @@
 """Calibrated intervals: closed forms, equivariance, exchange of labels, coverage of a known truth."""
 
+import warnings
 from dataclasses import replace
 from functools import partial
 
@@ -426,3 +427,9 @@ def test_the_scatter_between_sessions_is_that_of_their_means():
     assert gain == pytest.approx(np.sqrt((0.04**2 + 0.06**2 + 0.0) / 3 * 2 / 3))
     assert offset == pytest.approx(10 * gain)
     assert scatter_between_sessions(runs[::-1]) == pytest.approx((gain, offset))
+
+
+def test_a_ratio_whose_square_overflows_counts_as_one_without_a_warning():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert _squared_errors(run("a", peak=1e200, energy=np.inf)).tolist() == [0.0, 1.0, 1.0]

@@ -268,9 +268,10 @@ class Growth:
 
 def _squared_errors(run: PredictedRun) -> Floats:
     """(3,) squared relative errors of the force, the peak and the energy; values that are not finite count as one."""
-    force = float(np.mean((run.measured - run.predicted) ** 2)) / run.half**2
-    of_loops = [np.mean(np.where(np.isfinite(ratio), (ratio - 1) ** 2, 1.0)) for ratio in (run.peak, run.energy)]
-    return np.array([force if np.isfinite(force) else 1.0, *of_loops])
+    with np.errstate(over="ignore", invalid="ignore"):  # of a prediction that runs away
+        force = np.array([np.mean((run.measured - run.predicted) ** 2) / run.half**2])
+        squares = [force, (run.peak - 1) ** 2, (run.energy - 1) ** 2]
+    return np.array([np.mean(np.where(np.isfinite(of), of, 1.0)) for of in squares])
 
 
 def _expected(run: PredictedRun, at_tests: ModelError) -> Floats:
