@@ -80,6 +80,16 @@ def test_a_modified_model_prints_its_coordinates_and_their_functions():
     assert any(line.startswith(r"\alpha = F_z") for line in lines)
     assert any(line.startswith(r"x_z = \exp\left(") for line in lines)
     assert r"f_0 = 30" in lines
+    # What no function gives is a constant, or a relation of those that follow from functions.
+    for name in (r"\rho", "n", "k_2", "m"):
+        assert any(line.startswith(f"{name} = ") for line in lines), name
+    assert r"\gamma - \beta = \rho (\beta + \gamma)" in lines
+
+
+def test_latex_holds_no_character_that_needs_another_package():
+    text = LatexExporter().export(DAMPERS["joint"], "damper").files["damper.tex"].decode()
+    assert "2 (d $-$ e)" in text
+    assert not re.search("[−√≤≥∈α-ω]", text)
 
 
 def test_a_regression_has_no_equation():

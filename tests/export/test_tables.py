@@ -61,6 +61,8 @@ def test_a_matlab_script_holds_the_grid(tmp_path):
     np.testing.assert_allclose(read["current_A"], [[c.current_A for c in curves]], rtol=1e-9)
     np.testing.assert_allclose(read["velocity_m_s"], [curves[0].velocity], rtol=1e-9)
     np.testing.assert_allclose(read["force_N"], np.transpose([c.force for c in curves]), rtol=1e-9)
+    np.testing.assert_allclose(read["tested"], np.transpose([c.tested for c in curves]))
+    assert "% Tested: current 0 to 1 A, frequency 0.5 to 4 Hz" in path.read_text()
     assert read["force_N"].shape == (curves[0].velocity.size, len(curves))
 
 

@@ -209,6 +209,12 @@ def test_a_force_that_falls_back_is_refused_with_its_current(fy, said):
     assert refused.value.code == "E_NOT_MONOTONE"
 
 
+@pytest.mark.parametrize("highest", [-1.0, 0.0])
+def test_a_highest_current_of_an_inverse_is_above_zero(highest):
+    with pytest.raises(ParameterError, match="give a current above 0 A"):
+        invert(linear_in_current(600.0, 100.0), highest=highest)
+
+
 def test_a_force_that_falls_back_at_high_velocities_only_is_refused_with_its_current():
     """Friction alone rises least at low currents; with a viscous part that falls, the force turns back at high ones."""
     with pytest.raises(ParameterError, match=r"above 0\.8 A"):

@@ -15,14 +15,18 @@ from hashlib import sha256
 from html import escape
 from typing import Any
 
+_GREEK = {
+    "α": "alpha", "β": "beta", "γ": "gamma", "δ": "delta", "η": "eta", "φ": "phi", "ζ": "zeta", "ω": "omega",
+}  # fmt: skip
 _SPELLED = str.maketrans(
-    {"−": "-", "–": "-", "·": "*", "²": "^2", "³": "^3", "√": "sqrt", "≤": "<=", "≥": ">=", "∈": " in "}
-    | {"α": "alpha", "β": "beta", "γ": "gamma", "δ": "delta", "η": "eta", "φ": "phi", "ζ": "zeta", "ω": "omega"}
+    {"−": "-", "–": "-", "·": "*", "²": "^2", "³": "^3", "√": "sqrt", "≤": "<=", "≥": ">=", "∈": " in "} | _GREEK
 )
 _LATEX = str.maketrans(
     {c: rf"\{c}" for c in "&%$#_{}"}
     | {"~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "\\": r"\textbackslash{}"}
     | {"<": r"\textless{}", ">": r"\textgreater{}", "|": r"\textbar{}"}
+    | {"−": "$-$", "≤": r"$\le$", "≥": r"$\ge$", "∈": r"$\in$", "√": r"$\surd$"}  # not set up in a plain LaTeX
+    | {letter: rf"$\{name}$" for letter, name in _GREEK.items()}
 )
 _MARKDOWN = str.maketrans({c: f"\\{c}" for c in "!\"#$%&'()*+,-./:;<=>?@[\\]^_`{|}~"})
 _FORMULA = re.compile(r"'*\s*[=+\-@\t\r]")  # characters that begin a formula in a spreadsheet

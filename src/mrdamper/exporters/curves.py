@@ -54,10 +54,11 @@ class AdamsExporter(Exporter):
         files = {}
         for curve in force_velocity(damper):
             half = curve.velocity.size // 2
+            outside = 1e3 * curve.velocity[~curve.tested]
             at_rest = float(curve.force[half - 1 : half + 1].mean())
             points = [*zip(1e3 * curve.velocity[:half], curve.force[:half], strict=True), (0.0, at_rest)]
             points += zip(1e3 * curve.velocity[half:], curve.force[half:], strict=True)
-            text = render("damper.dmp.j2", rig=damper_of(damper).rig, curve=curve, points=points)
+            text = render("damper.dmp.j2", tested=_tested(damper), outside=outside, curve=curve, points=points)
             files[f"{name}_{curve.current_A:.3g}A.dmp".replace("-", "minus")] = text.encode("ascii", "replace")
         return Written(files, ("the curves contain no hysteresis; c and fmu do",))
 
@@ -86,9 +87,15 @@ class Dyna4Exporter(Exporter):
     def export(self, damper: Damper | Model, name: str) -> Written:
         curves, rig = force_velocity(damper), c_comment(damper_of(damper).rig or name)
         matrix = np.transpose([curve.force for curve in curves])
-        text = render("damper.m.j2", rig=rig, name=name, curves=curves, matrix=matrix)
+        inside = np.transpose([curve.tested for curve in curves]).astype(int)
+        facts = {"tested": _tested(damper), "inside": inside, "matrix": matrix}
+        text = render("damper.m.j2", rig=rig, name=name, curves=curves, **facts)
         note = "assign the vectors to the parameters of your vehicle model; such a table has no hysteresis"
         return Written({f"{name}.m": text.encode("ascii", "replace")}, (note,))
+
+
+def _tested(damper: Damper | Model) -> str:
+    return ", ".join(f"{title} {span}" for title, span in damper_of(damper).envelope.ranges(" to ").items())
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from typing import Any
+
+import numpy as np
 
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Condition
 from mrdamper.errors import ParameterError
 from mrdamper.statistics.functions.forms import ParameterFunction, form_named
 
+_SAME_VALUE = 1e-9  # relative difference of values that are one
 NOWHERE = Condition(0.0, 1.0, 0.01)  # any condition: a damper without ranges has one model for all
 
 
@@ -27,6 +31,7 @@ def equations(damper: Damper) -> list[str]:
     symbols |= {info.name: info.symbol for info in model.parameters()}
     lines = [line.strip() for line in damper.equation.split(r",\quad")]
     lines += [f"{symbols[name]} = {function_text(function)}" for name, function in damper.functions.items()]
+    lines += _constants(damper, model, symbols) if damper.functions else []
     if damper.tested_motions is not None:
         corners = ",\\; ".join(
             rf"({number(f)}\,\mathrm{{Hz}},\ {number(1e3 * A)}\,\mathrm{{mm}})"
@@ -36,6 +41,24 @@ def equations(damper: Damper) -> list[str]:
             rf"(f, A) \to \text{{nearest motion, in }}(\ln f, \ln A)\text{{, of the convex hull of }} {corners}"
         )
     return lines
+
+
+def _constants(damper: Damper, model: Any, symbols: Mapping[str, str]) -> list[str]:
+    """Write the parameters that no function gives: constant ones, and constant coordinates of those that vary."""
+    others = [damper.model_at(condition) for condition in damper.envelope.corners] if damper.envelope.tested else []
+
+    def is_constant(name: str) -> bool:
+        values = [getattr(one, name) for one in (model, *others)]
+        return bool(np.ptp(values) <= _SAME_VALUE * np.max(np.abs(values)))
+
+    rest = [info.name for info in model.parameters() if info.name not in damper.functions]
+    constants, lines = [name for name in rest if is_constant(name)], list[str]()
+    if len(constants) < len(rest):
+        for name, (_, relation, _) in type(model).coordinates.items():
+            if name not in damper.functions and hasattr(model, name) and is_constant(name):
+                lines.append(relation)
+                constants.append(name)
+    return [*lines, *(f"{symbols[name]} = {number(float(getattr(model, name)))}" for name in constants)]
 
 
 def function_text(function: ParameterFunction) -> str:

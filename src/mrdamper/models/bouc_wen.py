@@ -69,6 +69,11 @@ class BoucWen(Model):
         return self.shape.yield_displacement  # type: ignore[return-value]
 
     @property
+    def asymmetry(self) -> float:
+        """(gamma − beta)/(gamma + beta)."""
+        return (self.gamma - self.beta) / (self.gamma + self.beta)
+
+    @property
     def yield_force(self) -> float:
         """Alpha · z_max, the hysteretic force after yield [N]."""
         return self.alpha * self.yield_displacement

@@ -52,6 +52,10 @@ def check_monotone(damper: Damper, highest: float | None = None) -> float:
 
     Raises `ParameterError` (E_NOT_MONOTONE) with the current above which it decreases.
     """
+    if highest is not None and not highest > 0:
+        raise ParameterError(
+            f"highest is {highest:g} A", where=damper.title, remedy="give a current above 0 A", code="E_ARGUMENT"
+        )
     low, high = 0.0, damper.envelope.current_A[1] if highest is None else highest
     if not high > low:
         raise ParameterError(
@@ -214,7 +218,8 @@ def invert(damper: Damper, highest: float | None = None) -> Inverse:
     Raises
     ------
     ParameterError
-        E_NOT_MONOTONE if more current somewhere gives less force, or as `stream`.
+        E_NOT_MONOTONE if more current somewhere gives less force, E_ARGUMENT if `highest` is not above zero, or as
+        `stream`.
 
     Examples
     --------
