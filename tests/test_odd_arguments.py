@@ -260,6 +260,8 @@ def test_arguments_that_a_function_does_not_have_are_answered_with_those_it_has(
             lambda: Condition(current=0.5, frequency=2, amplitude=10),
             "argument 'current'; write Condition.current_A=",
         ),
+        (lambda: mrdamper.identify(t, t, t), "a ndarray in place of a run"),
+        (lambda: mrdamper.data.Dataset("mine", ()), "runs is 'mine'; give it as"),
     ):
         with pytest.raises(InputError, match=says):
             call()

@@ -44,6 +44,13 @@ def test_round_trip_keeps_every_bit(tmp_path):
     assert after["a"].velocity is None
 
 
+def test_the_result_of_a_study_is_no_dataset_and_no_rig_files(tmp_path):
+    for name in ("identifications.csv", "model-utfsm.json", "report.html"):
+        (tmp_path / name).write_text("{}")
+    with pytest.raises(DatasetError, match="this is the result of a study"):
+        load_dataset(tmp_path)
+
+
 def test_a_constant_current_is_corrected_in_the_table_of_runs_beside_a_measured_one(tmp_path, bundled):
     still, other = (replace(run, id=name) for run, name in zip(list(bundled)[:2], "ab", strict=True))
     still = replace(still, current=np.full(still.time.size, 1.0))

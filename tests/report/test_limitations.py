@@ -50,6 +50,21 @@ def test_a_search_that_did_not_converge_is_said_so_in_a_sentence(why, said):
         assert sentences[0] == said
 
 
+def test_runs_of_fewer_than_two_whole_cycles_are_named():
+    motion = SimpleNamespace(cycles=0.99, is_sine=True, drift=0.0)
+    condition = Condition(0.5, 1.5, 0.015)
+    fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), StopReason.SETTLED, 0.1)
+    loops = [SimpleNamespace(run_id=name, condition=condition, motion=motion) for name in ("short", "shorter")]
+    assert any(
+        s.startswith("Fewer than two whole cycles in 2 runs: short") for s in texts_of(limitations(scored(fit), loops))
+    )
+    longer = [
+        SimpleNamespace(**{**vars(loop), "motion": SimpleNamespace(**{**vars(motion), "cycles": 2.0})})
+        for loop in loops
+    ]
+    assert not any("whole cycles" in s for s in texts_of(limitations(scored(fit), longer)))
+
+
 def test_a_second_end_of_the_search_is_told_with_its_error():
     fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), StopReason.SETTLED, 0.1)
     worse, better = (LocalMinimum(1.4e-3, e, 4e-4, 0.0266) for e in (0.0273, 0.026))

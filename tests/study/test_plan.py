@@ -87,6 +87,12 @@ def test_a_doubt_can_be_chosen(damper, reckoning):
         plan_tests(damper, LIMITS, 0.3, "x")
 
 
+def test_without_limits_the_tested_ranges_are_planned_in(damper):
+    made, about = plan_tests(damper, hours=0.3)
+    assert about.limits == Limits.of(damper)
+    assert made == plan_tests(damper, Limits.of(damper), 0.3)[0]
+
+
 def test_what_no_run_could_tell_is_planned_for():
     known = estimate_uncertainty(joint_damper(), [run for run in session_runs(joint_damper()) if run.current_A == 0.5])
     assert "c1" in known.uncertainty.unknown

@@ -11,7 +11,7 @@ import numpy as np
 from mrdamper.data.displayable import Displayable
 from mrdamper.data.runs import Run, Split
 from mrdamper.data.wording import counted
-from mrdamper.errors import RunError, UnknownNameError, check_fields, shown, validate_arguments
+from mrdamper.errors import RunError, UnknownNameError, check_fields, is_a, shown, validate_arguments
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -47,7 +47,9 @@ class Dataset(Displayable):
     name: str = "dataset"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "runs", tuple(self.runs) if np.iterable(self.runs) else self.runs)
+        object.__setattr__(
+            self, "runs", tuple(self.runs) if np.iterable(self.runs) and not is_a(self.runs, str) else self.runs
+        )
         check_fields(self, "runs", "name")
         if not self.runs:
             raise RunError("no runs", where=f"dataset {self.name}", remedy="give at least one")

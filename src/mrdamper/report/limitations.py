@@ -30,6 +30,7 @@ _MAX_ENERGY_ERROR = 0.15  # relative error of the dissipated energy [-]
 _MAX_DRIFT_M_S = 1e-4  # drift of the mean position [m/s]
 _MAX_CORRELATION = 0.85  # correlation coefficient of tested frequencies and amplitudes [-]
 _MIN_LEVELS = 4  # number of tested currents
+_MIN_CYCLES = 1.95  # cycles of a record from which its repeatability is determined
 _MAX_RUNS = 4  # number of runs named in one sentence
 _SAME_CURRENT_A = 0.01  # difference of currents that are one level [A]
 _SAME_TEMPERATURE_K = 5.0  # difference of temperatures that are one [K]
@@ -240,6 +241,12 @@ def _tests(loops: Sequence[LoopAnalysis]) -> list[str]:
         sentences.append(
             f"Distorted sine motion in {len(distorted)} of {counted(len(loops), 'run')} (distortion up to "
             f"{100 * worst:.0f} %); identification uses the measured motion."
+        )
+    short = [loop.run_id for loop in loops if loop.motion.cycles < _MIN_CYCLES]
+    if short:
+        sentences.append(
+            f"Fewer than two whole cycles in {counted(len(short), 'run')}: {listed(short, _MAX_RUNS)}; "
+            "their repeatability is not determined, and the start of the motion is part of them."
         )
     drifting = [loop.run_id for loop in loops if abs(loop.motion.drift) > _MAX_DRIFT_M_S]
     if drifting:

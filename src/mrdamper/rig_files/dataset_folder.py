@@ -153,7 +153,9 @@ def runs_table(folder: Path) -> list[dict[str, Any]]:
     if not path.is_file():
         hint = "write one row a run: run_id, current_A, ... (README, what a dataset is)"
         if any(p.is_file() and p.name not in SAMPLE_FILES for p in folder.iterdir()):
-            hint = f"are these files of a rig? mrdamper import {folder.name or folder} --out DATASET makes a dataset"
+            hint = f"are these files of a rig? mrdamper import {folder} --out DATASET makes a dataset"
+        if (folder / "identifications.csv").is_file() and any(folder.glob("model*.json")):
+            hint = "this is the result of a study: give the dataset it was made from; load_model reads its model"
         raise DatasetError("runs.csv is missing", where=str(folder), remedy=hint)
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:

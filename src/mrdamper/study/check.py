@@ -131,7 +131,7 @@ def _of_accepted_runs(
     @wraps(identify_run)
     def identify_accepted(run: Run, *args: P.args, **kwargs: P.kwargs) -> identification.Identification:
         if not is_a(run, Run):
-            return identify_run(run, *args, **kwargs)  # states the correct argument
+            return identify_run(run, **kwargs)  # type: ignore[call-arg]  # states the correct argument
         refusal, noted = check_run(run)
         if refusal is not None:
             raise refusal

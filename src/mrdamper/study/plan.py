@@ -42,8 +42,8 @@ _SEED = 20240813
 @validate_arguments("hours")
 def plan_tests(
     damper: Damper,
-    limits: Limits,
-    hours: float,
+    limits: Limits | None = None,
+    hours: float = 1.0,
     about: str | Condition | None = None,
     progress: Progress = silent,
 ) -> tuple[list[Proposal], ExperimentDesign]:
@@ -53,7 +53,8 @@ def plan_tests(
     ----------
     damper : Damper
         With its covariance.
-    limits : Limits
+    limits : Limits, optional
+        Default: the ranges of the tests, `mrdamper.study.limits.Limits.of(damper)`.
     hours : float
         Rig time, including set-up of sessions.
     about : str, Condition or None
@@ -72,13 +73,13 @@ def plan_tests(
     --------
     >>> from importlib.resources import files
     >>> from mrdamper import load_model, plan_tests
-    >>> from mrdamper.study.limits import Limits
     >>> damper = load_model(files("mrdamper.data.bundled") / "models/labcontrol.json")
-    >>> proposals, _ = plan_tests(damper, Limits.of(damper), hours=0.5)
+    >>> proposals, _ = plan_tests(damper, hours=0.5)
     >>> len(proposals) > 0
     True
     """
     (hours,) = numbers(hours)
+    limits = limits or Limits.of(damper)
     conditions = limits.candidates(hours)
     reckoning = ExperimentDesign.of(damper, limits, conditions, about, progress)
     progress("choosing records", 0.9)
