@@ -1,5 +1,6 @@
 """`tests.csv`, adding to a dataset and holding runs out: by the command line, as users do."""
 
+import shutil
 import time
 from pathlib import Path
 
@@ -27,19 +28,25 @@ def lab():
     return Lab(campaign(2, currents=(0.0, 0.6, 1.2), points=60, cycles=3))
 
 
-@pytest.fixture
-def rig(lab, tmp_path):
-    folder = tmp_path / "rig"
-    folder.mkdir()
-    lab_exports.tests_table(lab, folder)
+@pytest.fixture(scope="module")
+def imported(lab, tmp_path_factory):
+    """A folder of a laboratory and the dataset made of it."""
+    folder = tmp_path_factory.mktemp("imported")
+    (folder / "rig").mkdir()
+    lab_exports.tests_table(lab, folder / "rig")
+    done = run("import", folder / "rig", "--out", folder / "ds")
+    assert done.exit_code == 0, done.output
     return folder
 
 
 @pytest.fixture
-def dataset(rig, tmp_path):
-    done = run("import", rig, "--out", tmp_path / "ds")
-    assert done.exit_code == 0, done.output
-    return tmp_path / "ds"
+def rig(imported, tmp_path):
+    return shutil.copytree(imported / "rig", tmp_path / "rig")
+
+
+@pytest.fixture
+def dataset(imported, tmp_path):
+    return shutil.copytree(imported / "ds", tmp_path / "ds")
 
 
 def test_the_table_beside_the_files_is_used(dataset, lab):
