@@ -1,4 +1,6 @@
+import copy
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -30,6 +32,10 @@ def test_round_trip_is_bit_exact(damper, tmp_path):
     save_model(damper, tmp_path / "model.json")
     back = load_model(tmp_path / "model.json")
     assert dump_model(back) == dump_model(damper)
+    assert back == damper == copy.deepcopy(damper)
+    assert hash(back) == hash(damper)
+    assert back != replace(damper, rig="another")
+    assert back != damper_of(Bingham(c=1.0, fy=2.0, f0=0.0))
     assert back.parameters.functions == damper.parameters.functions
     condition = Condition(0.7, 1.1, 0.015)
     assert (back.predict(condition).force == damper.predict(condition).force).all()

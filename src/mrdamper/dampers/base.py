@@ -97,6 +97,20 @@ class Damper(Displayable):
     coil: Coil | None = None
     uncertainty: Uncertainty | None = None
 
+    def __eq__(self, other: object) -> bool:
+        """Tell if two dampers are saved alike: one that was saved and loaded equals itself."""
+        if self is other or type(self) is not type(other):
+            return self is other
+        assert isinstance(other, Damper)
+        dump = import_module("mrdamper.dampers.model_file").dump_model  # which imports this module
+        try:
+            return bool(dump(self) == dump(other))
+        except InputError:  # one without tests, or of a kind that is not saved
+            return False
+
+    def __hash__(self) -> int:
+        return hash((self.kind, self.rig, tuple(p.value for p in self.fitted_parameters.values())))
+
     @property
     @abstractmethod
     def title(self) -> str:
