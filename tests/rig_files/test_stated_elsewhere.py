@@ -215,6 +215,30 @@ def test_rows_of_a_plan_are_not_counted_where_they_may_be_other_tests(plan, tmp_
     assert found.left_out == ("plan.csv",)
 
 
+@pytest.mark.parametrize(
+    ("key", "head", "cells"),
+    [
+        ("Corner", "Corner,{}", ("RR", "LF", "RF", "LR")),
+        ("S/N", "Serial number,{}", ("1204", "1187", "1188", "1203")),
+        ("Test name", "Test name: {}", ("RR rebound", "LF rebound", "RF rebound", "LR rebound")),
+        ("Start time", "Start,{}", [f"2024-05-14 {hour}:15:00" for hour in (13, 10, 11, 12)]),
+    ],
+)
+def test_rows_of_a_plan_are_those_of_the_tests_whose_head_lines_state_the_same_in_whatever_order(
+    key, head, cells, tmp_path
+):
+    currents = (1.1, 0.3, 0.5, 0.9)  # of the rows; the files are numbered in another order
+    of = dict(zip(cells, currents, strict=True))
+    for number, cell in enumerate(sorted(cells), 1):
+        lines = ["Dyno,Roehrig", head.format(cell), "Time (s),Displacement (mm),Force (N)"]
+        table(tmp_path / f"shock_{number}.csv", lines, T, X, force(of[cell]))
+    rows = [f"{cell},{current}" for cell, current in of.items()]
+    (tmp_path / "summary.csv").write_text("\n".join([f"{key},Current (A)", *rows, ""]))
+    expect(tmp_path, *(of[cell] for cell in sorted(cells)))
+    (found,) = {tuple(record.provenance["current_from"] for record in import_files([tmp_path]).records)}
+    assert set(found) == {"summary.csv, Current (A)"}
+
+
 def test_two_currents_are_named_where_either_may_be_that_of_the_coil(tmp_path):
     names = "Time [s],Displacement [mm],Force [N],Coil 1 current [A],Coil 2 current [A]"
     table(tmp_path / "a.csv", [names], T, X, force(0.5), 0.5 + 0 * T, 0.3 + 0 * T)

@@ -271,7 +271,7 @@ def _squared_errors(run: PredictedRun) -> Floats:
     with np.errstate(over="ignore", invalid="ignore"):  # of a prediction that runs away
         force = np.array([np.mean((run.measured - run.predicted) ** 2) / run.half**2])
         squares = [force, (run.peak - 1) ** 2, (run.energy - 1) ** 2]
-    return np.array([np.mean(np.where(np.isfinite(of), of, 1.0)) for of in squares])
+    return np.array([float(np.mean(np.where(np.isfinite(of), of, 1.0))) for of in squares])
 
 
 def _expected(run: PredictedRun, at_tests: ModelError) -> Floats:

@@ -222,7 +222,7 @@ def split_name(header: str, unit: str = "") -> Header:
         if place.start() and is_unit(tail) and not text[: place.start()].endswith(" of"):  # time of day
             return Header(text[: place.start()].strip(), tail)
     name, slash, tail = text.partition("/")
-    if slash and name and is_unit(tail) and not is_unit(text):
+    if slash and name and is_unit(tail) and not is_unit(text) and text.casefold() != "s/n":  # serial number
         return Header(name.strip(), tail.strip())
     match = _BRACKETED.match(text)
     own = parse_unit(text) if len(text) > 3 and is_unit(text) else None  # Amps, Newtons

@@ -17,6 +17,7 @@ from mrdamper.errors import InputError
 REQUIRED = ("time", "displacement", "force")
 OPTIONAL = ("velocity", "acceleration", "current", "voltage", "temperature", "pressure")
 SIGNED = ("displacement", "force")  # rigs count them positive in extension or in compression
+HEAD = "head"  # in the provenance: lines above a test with a name and a value, for rows of a table that state the same
 COARSE_CLOCK = 0.1  # share of the samples whose stamp is that of the one before
 FURTHER = {"acceleration": "m_s2", "voltage": "V", "temperature": "C", "pressure": "Pa"}  # and their SI unit
 

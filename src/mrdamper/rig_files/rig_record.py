@@ -24,7 +24,7 @@ from mrdamper.rig_files.parts import stretches_of_time
 from mrdamper.rig_files.profile import Correction, Profile
 from mrdamper.rig_files.readers import suffixes
 from mrdamper.rig_files.readers.base import RawTable
-from mrdamper.rig_files.record import FURTHER, OPTIONAL, Finding, Record
+from mrdamper.rig_files.record import FURTHER, HEAD, OPTIONAL, Finding, Record
 from mrdamper.rig_files.sequences import stretches_of_session
 
 _KEPT = {**FURTHER, "length": "m", "force": "N"}
@@ -34,6 +34,7 @@ _SCALE_CELL = re.compile(r"([+-]?[0-9]+(?:[.,][0-9]+)?)(?:\s*[A-Za-zµ]+/(?:digi
 _SAMPLE = 10_000  # samples looked at
 _LEAST_CURRENT = 0.02  # [A] largest of a record: less is no current of a coil
 _MOST_FURTHER = 12  # channels
+_MOST_HEAD_LINES = 20
 _LENIENT = ("acceleration", "voltage", "temperature", "pressure")  # a damaged cell there costs the channel, not the run
 _DATES, _TIMES = words("date_line"), words("time_of_day")
 _KEYED = re.compile(r"^[\W_]*(?P<key>[^\W\d_][\w ./-]{0,40}?)[\"' ]*[:=;,\t]+[\"' ]*(?P<value>\S.{0,60})")
@@ -297,8 +298,10 @@ def _remarks(table: RawTable, profile: Profile, assigned: dict[str, Assigned]) -
     remarks |= {"specimen": table.damper} if table.damper else {}
     if ignored:
         remarks["ignored_columns"] = listed(ignored, 20)
+    keyed = [_KEYED.match(line) for line in table.remarks]
     return {
         **recording_time(table.remarks),
+        HEAD: "; ".join([f"{m['key']}: {m['value']}" for m in keyed if m][:_MOST_HEAD_LINES]),
         **{key: coil_current.as_data(text) for key, text in remarks.items()},
         "sign_changed": ", ".join(role for role, entry in assigned.items() if entry.sign < 0),
         "scaled": ", ".join(f"{r} = {scale:g}" for r in assigned if (scale := profile.channel(r).scale)),

@@ -26,7 +26,7 @@ from mrdamper.rig_files.quality.motion import moves
 from mrdamper.rig_files.quality.view import View, strokes_of
 from mrdamper.rig_files.readers import ask_tables, raw_tables
 from mrdamper.rig_files.readers.base import RawTable
-from mrdamper.rig_files.record import Finding, Record, part_of_record
+from mrdamper.rig_files.record import HEAD, Finding, Record, part_of_record
 
 _LEGEND = re.compile(  # I1 = 0.3 A, cur0.8 = coil current 0.8 A (as set)
     r"[\s*`-]*(.{1,60}?)`?\s*(?:=|:|->)\s*([^\W\d_][^\d=:]{0,30}\s)?([0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(m?A)"
@@ -119,8 +119,15 @@ def _by_rows(results: Results, tests: _Tests) -> Iterator[Mapping[int, float]]:
 
     def by_name(rows: Results, own: Sequence[int]) -> dict[int, float]:
         one = len(rows.current) == len(own) == 1
-        stated = {0: rows.current[0]} if one else rows.by_test([called[i] for i in own])
-        stated = stated or rows.by_clock([(_start(tests[i]), float(np.ptp(tests[i][1].time))) for i in own])
+        if one:
+            return {own[0]: rows.current[0]}
+        names = [called[i] for i in own]
+        starts = [(_start(tests[i]), float(np.ptp(tests[i][1].time))) for i in own]
+        by_head = rows.by_test([_head(tests[i][1]) for i in own], whole_names=True)
+        by_file = rows.by_test(names, whole_names=True)
+        if len(by_head) == len(by_file) == len(own) and by_head != by_file:
+            return {}
+        stated = by_head if len(by_head) == len(own) else by_file or rows.by_clock(starts) or rows.by_test(names)
         return {own[i]: current for i, current in stated.items()}
 
     def by_group(groups: Sequence[str], by: Callable[[Results, Sequence[int]], dict[int, float]]) -> dict[int, float]:
@@ -130,7 +137,7 @@ def _by_rows(results: Results, tests: _Tests) -> Iterator[Mapping[int, float]]:
 
     yield by_range(results, range(len(tests)))
     yield by_group(files, by_range)
-    yield results.by_test(called) or by_name(results, range(len(tests)))
+    yield by_name(results, range(len(tests)))
     yield by_group(folders, by_name)
 
 
@@ -444,6 +451,11 @@ def _called(tests: _Tests) -> list[tuple[str, ...]]:
         paths = ["\\".join((*file.parts[-n:-1], name)) for n in (2, 3, 4) for name in (file.name, file.stem)]
         names.append((record.id, file.name, file.stem, own, *blocks, *paths))
     return names
+
+
+def _head(record: Record) -> list[str]:
+    """Return the lines above a test that state one word or number by its name."""
+    return record.provenance.get(HEAD, "").split("; ")
 
 
 def _start(test: tuple[Path, Record]) -> str:

@@ -65,26 +65,27 @@ class Results:
     counts_tests: bool = True  # so that a number in a test's name may be meant; Day 1: 0.5 A counts something else
     pauses: tuple[tuple[str, ...], ...] = ()  # cells of the rows that state no current and no other number
 
-    def by_test(self, tests: Sequence[Iterable[str]]) -> dict[int, float]:
+    def by_test(self, tests: Sequence[Iterable[str]], *, whole_names: bool = False) -> dict[int, float]:
         """Return the current [A] of each test by its number, where one column of the table tells all of them apart.
 
-        Of each test all that it is called is given: its label, its file, the lines above it.
+        Of each test all that it is called is given: its label, its file, the lines above it. With `whole_names` a cell
+        is all of a name; otherwise a number in it, or that of the row, may tell the test as well.
         """
         names = [_names(texts) for texts in tests]
         one_of_several = len(tests) == 1 < len(self.current)  # a number in its name alone may count anything
-        by_number = self.counts_tests and not one_of_several
+        by_number = self.counts_tests and not one_of_several and not whole_names
         columns, of_row = self._columns_of_names(len(tests))
         for exact in (True,) if not by_number else (True, False):
             matches = [(column, match) for column in columns if (match := _match(column, names, exact))]
             texts = any(not all(map(NUMBER.fullmatch, column)) for column, _ in matches)  # surer than the row's number
-            rows = () if exact and texts else of_row
+            rows = () if (exact and texts) or whole_names else of_row
             matches += [(row, match) for row in rows if (match := _match(row, names, exact))]
             currents = [{i: self.current[row] for i, row in match.items()} for _, match in matches]
             if currents and all(other == currents[0] for other in currents):
                 return currents[0]
             if currents:
                 break
-        return self._by_labels(tests) if self.counts_tests else {}
+        return self._by_labels(tests) if self.counts_tests and not whole_names else {}
 
     def _by_labels(self, tests: Sequence[Iterable[str]]) -> dict[int, float]:
         """Return the current [A] of each test by the numbers in its name behind the beginnings of headings: S1_T02.

@@ -16,7 +16,7 @@ from mrdamper.data.wording import counted
 from mrdamper.errors import ColumnError, QualityError, RunError
 from mrdamper.rig_files.quality import check_record, checked, lag, loop, motion, samples
 from mrdamper.rig_files.quality.view import SHORTEST, View
-from mrdamper.rig_files.record import FURTHER, Finding, Record
+from mrdamper.rig_files.record import FURTHER, HEAD, Finding, Record
 
 NOT_IDENTIFIED = ("W_CLIPPED", "W_SHORT", "W_CURRENT_VARIES")  # what identification refuses by default
 FIGURES = MappingProxyType(
@@ -159,6 +159,7 @@ def to_run(record: Record) -> Run:
     codes = " ".join(dict.fromkeys(finding.code for finding in record.findings))
     further = {f"{name}_{unit}": getattr(record, name) for name, unit in FURTHER.items()} | dict(record.further)
     own: dict[str, Any] = {name: getattr(record, name) for name in ("id", "rig", "excitation", "split")}
+    notes = {key: text for key, text in record.provenance.items() if key != HEAD}
     own |= {name: values[keep] for name, values in record.channels.items() if name in samples.USED}
     run = Run(
         **own,
@@ -166,7 +167,7 @@ def to_run(record: Record) -> Run:
         window=steady.window,
         repeatability=steady.repeatability,
         segments=tuple(pairwise(bounds)),
-        notes={**record.provenance, **({"findings": codes} if codes else {})},
+        notes={**notes, **({"findings": codes} if codes else {})},
     )
     for values in (record.time, record.displacement, record.force, record.current):
         if values is not None:
