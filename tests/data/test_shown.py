@@ -1,14 +1,26 @@
 """What a notebook shows: a line, a table, data frames, loops in axes of one's own."""
 
 from dataclasses import replace
+from importlib.resources import files
 
 import numpy as np
 import polars
 import pytest
 from support.dampers import all_dampers, joint_damper
 
-from mrdamper import identify, load_input, load_system, plot_force, plot_loop, simulate_system, validate
+from mrdamper import (
+    identify,
+    invert,
+    load_input,
+    load_model,
+    load_system,
+    plot_force,
+    plot_loop,
+    simulate_system,
+    validate,
+)
 from mrdamper.dampers.base import Damper
+from mrdamper.dampers.streaming import stepper
 from mrdamper.data import Condition
 from mrdamper.errors import InputError
 from mrdamper.study.recipe import RecipeResult, whole_damper
@@ -28,6 +40,21 @@ def shown(bundled):
         "simulation": simulate_system(load_system("quarter-car").system, load_input("bump"), {}, step=1e-3),
         **{f"damper {name}": d for name, d in all_dampers().items() if isinstance(d, Damper)},
     }
+
+
+def test_objects_without_a_table_are_shown_in_a_line():
+    model = load_model(files("mrdamper.data.bundled") / "models/labcontrol.json")
+    shown = [
+        model.prediction_interval(model.predict(Condition(0.5, 1.0, 0.01))),
+        load_system("dyke1996").system,
+        stepper(model),
+        invert(model),
+    ]
+    for one in shown:
+        assert repr(one).startswith("<")
+        assert len(repr(one)) < 200
+        assert " at 0x" not in repr(one)
+        assert "array" not in repr(one)
 
 
 def test_a_line_a_table_and_data_frames(shown):

@@ -16,7 +16,7 @@ from mrdamper.dampers.sessions import SessionCorrection
 from mrdamper.dampers.slopes import force_slopes, relative_variances
 from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import SESSIONS_NEEDED, Condition, Floats
-from mrdamper.data.wording import counted, number
+from mrdamper.data.wording import counted, number, span
 from mrdamper.errors import ParameterError
 from mrdamper.identification.intervals import student
 from mrdamper.physics.motion.made import sine
@@ -27,7 +27,7 @@ _LARGEST_FORCE_N = 1e100  # whose square is finite
 Mask = NDArray[np.bool_]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Band:
     """Prediction intervals at one level."""
 
@@ -42,6 +42,9 @@ class Band:
     # relative, around the predicted dissipated energy, and not below -1, because a damper dissipates energy
     energy: tuple[float, float]
     known_session: tuple[float, float]  # peak force once the session's gain is known [N]
+
+    def __repr__(self) -> str:
+        return f"<prediction intervals of {counted(self.low.size, 'sample')}; peak force {span(*self.peak, 'N')}>"
 
 
 def band(

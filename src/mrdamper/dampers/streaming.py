@@ -98,6 +98,9 @@ class Stepper:
         self.set_parameters()
         self.reset()
 
+    def __repr__(self) -> str:
+        return f"<{self.stream.title}, sample by sample>"
+
     def reset(self) -> None:
         """Return to the state at rest."""
         self._memory = tuple(self.stream.step.tape.starts.values())

@@ -172,6 +172,9 @@ class Inverse:
         self._derived = prepare(())[1]
         self.reset()
 
+    def __repr__(self) -> str:
+        return f"<{self.title}>"
+
     def reset(self) -> None:
         """Return to the state at rest."""
         self._memory = tuple(self.program.tape.starts.values())

@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.wording import counted
 from mrdamper.errors import StructureError, UnknownNameError, check_fields, validate_arguments
 
 _MAX_FREQUENCY_HZ = 2e3  # natural frequency [Hz]: beyond, a unit is wrong, and a second requires over 80,000 steps
@@ -33,7 +34,7 @@ class Link:
     gap: float = 0.0  # free travel of a bump stop in each direction; static deflection of a tyre [m]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class System:
     """A linear structure M x'' + C x' + K x = load − B' f, f the forces of links."""
 
@@ -53,6 +54,10 @@ class System:
     points: Mapping[str, Floats] = field(default_factory=dict)
     # relative displacements to report, between two points: storey drifts, suspension travel
     spans: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        links = ", ".join(f"{link.role} {link.name}" for link in self.links) or "no links"
+        return f"<system {self.name}: {self.title}; {counted(len(self.coordinates), 'coordinate')}, {links}>"
 
     def __post_init__(self) -> None:
         check_fields(self)
