@@ -136,7 +136,7 @@ def test_what_the_design_of_the_tests_cannot_show_is_stated_first(conditions, sa
     tests = {f"t{k}": Condition(*condition) for k, condition in enumerate(conditions)}
     runs = tuple(RunScore(name, "rig", at, Scores(0.02, *5 * (0.0,)), None, ()) for name, at in tests.items())
     loops = [
-        SimpleNamespace(run_id=name, condition=at, motion=SimpleNamespace(is_sine=True, drift=0.0))
+        SimpleNamespace(run_id=name, condition=at, motion=SimpleNamespace(is_sine=True, drift=0.0, cycles=5.0))
         for name, at in tests.items()
     ]
     entries = texts_of(limitations(replace(scored(fit), train=Validation("train", runs)), loops))
