@@ -21,7 +21,7 @@ def test_a_refused_argument_is_stated_in_a_line_with_what_is_wanted():
     joint = joint_damper()
     cases = (
         (lambda: mrdamper.validate(joint, joint), "give it as Iterable[Run]"),
-        (lambda: mrdamper.plan_tests(joint), "= ...); see help(plan_tests)"),
+        (lambda: mrdamper.plan_tests(joint, hour=1), "= ...); see help(plan_tests)"),
         (lambda: Condition(0.5, 2.0, 6.130609100440717), "amplitude is 6.1306091 m"),
     )
     for call, text in cases:
