@@ -15,6 +15,10 @@ from xml.etree import ElementTree
 
 from fuzz.counting import NASTY, Count, names, within
 
+_WRITTEN_IN_LATEX = re.compile(  # marks that are escaped, and the signs and Greek letters that are set as formulas
+    r"\\(text[a-z]+\{\}|[&%$#_{}])|\$(-|\\(le|ge|in|surd|alpha|beta|gamma|delta|eta|phi|zeta|omega))\$"
+)
+
 
 def attack_names(share: float) -> list[Count]:
     """Names where they are written: C is compiled, XML and HTML parsed, Markdown rendered, CSV read again."""
@@ -44,7 +48,7 @@ def attack_names(share: float) -> list[Count]:
             counts["name in XML and HTML"].check(not len(element) and seen == ["a"], name)
         except ElementTree.ParseError:
             counts["name in XML and HTML"].check(False, name)
-        rest = re.sub(r"\\(text[a-z]+\{\}|[&%$#_{}])", "", encoding.latex(name))
+        rest = _WRITTEN_IN_LATEX.sub("", encoding.latex(name))
         counts["name in LaTeX"].check(not re.search(r"[\\&%$#_{}^~\n]", rest), name)
         kinds = {child.type for child in markup.parseInline(encoding.markdown(name))[0].children or ()}
         counts["name in Markdown"].check(kinds <= {"text", "text_special"}, name)

@@ -239,6 +239,20 @@ def test_rows_of_a_plan_are_those_of_the_tests_whose_head_lines_state_the_same_i
     assert set(found) == {"summary.csv, Current (A)"}
 
 
+@pytest.mark.parametrize("order", [(0.3, 0.5, 0.9, 1.1), (1.1, 0.5, 0.3, 0.9)])
+def test_rows_in_another_order_than_the_tests_are_refused_where_their_peak_forces_show_it(order, tmp_path):
+    for number, current in enumerate((0.3, 0.5, 0.9, 1.1), 1):
+        table(tmp_path / f"run_{number}.csv", ["Time (s),Displacement (mm),Force (N)"], T, X, force(current))
+    rows = [f"{current},{np.max(force(current)) + 60:.0f}" for current in order]
+    (tmp_path / "summary.csv").write_text("\n".join(["Current (A),Peak force (N)", *rows, ""]))
+    found = import_files([tmp_path])
+    if order[0] == 0.3:
+        assert [record.current[0] for record in found.records] == list(order)
+    else:
+        assert {refusal.error.code for refusal in found.refusals} == {"E_MOTION_CONTRADICTS"}
+        assert "another order" in str(found.refusals[0].error)
+
+
 def test_two_currents_are_named_where_either_may_be_that_of_the_coil(tmp_path):
     names = "Time [s],Displacement [mm],Force [N],Coil 1 current [A],Coil 2 current [A]"
     table(tmp_path / "a.csv", [names], T, X, force(0.5), 0.5 + 0 * T, 0.3 + 0 * T)

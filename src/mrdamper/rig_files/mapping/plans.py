@@ -51,6 +51,12 @@ _MOTIONS = (  # dimension and name of a column, relative difference of two tests
     ("frequency", re.compile(r"(?i)^(?:f\b|freq|frec|fréq|част|频率|周波数|częst)"), 0.15, "Hz", 1.0),
     ("length", re.compile(r"(?i)ampl|^x_?0$|^(?:stroke|hub|course|carrera|corsa)$|振幅|행정|行程"), 0.5, "mm", 1e3),
 )
+_PEAK = re.compile(r"(?i)peak|pico|picco|crête|spitze|max|峰|최대|пик|макс")
+_FEWEST_PEAKS, _PEAK_RATIO, _ALIKE = (
+    3,
+    1.3,
+    0.5,
+)  # tests; largest peak over the smallest; correlation of their logarithms
 _Tests = Sequence[tuple[Path, Record]]
 _REMARKS = frozenset((*words("notes"), *words("remarks")))
 _LABELS = words("specimen") | words("rig")
@@ -184,11 +190,30 @@ def other_motions(path: Path, results: Results | None, tests: _Tests) -> InputEr
             if max(share := own / stated / usual, 1 / share) > 1 + limit:
                 moving = f"{record.id}, which moves {'at' if unit == 'Hz' else 'by'} {number(size * own, 3)} {unit}"
                 texts.append(f"{path.name} states {size * stated:g} {unit} of {moving}")
+    texts += _other_peaks(path, results, tests)
     if not texts:
         return None
     problem = f"{listed(texts, 2)}: are its rows those of other tests?"
     remedy = "write the current of each test into tests.csv (--write-tests), or correct the plan"
     return QualityError(printable(problem), where=path.name, remedy=remedy, code="E_MOTION_CONTRADICTS")
+
+
+def _other_peaks(path: Path, results: Results | None, tests: _Tests) -> list[str]:
+    """Tell if the peak forces of a plan's rows are in another order than those of their tests.
+
+    Peaks are with or without the gas force, or peak to peak, so their sizes are not compared.
+    """
+    stated = results.numbers("force", _PEAK.search) if results else []
+    rows = rows_beside(path, results, tests) if stated else []
+    theirs, own = np.array([stated[row] for row in rows]), np.array([np.ptp(r.force[r.present]) / 2 for _, r in tests])
+    if len(rows) < _FEWEST_PEAKS or min(theirs.min(), own.min()) <= 0 or theirs.max() < _PEAK_RATIO * theirs.min():
+        return []
+    sizes = np.log([theirs, own])
+    if np.corrcoef(sizes)[0, 1] > _ALIKE:
+        return []
+    at = int(np.argmax(np.abs(sizes[0] - sizes[1])))
+    both = f"{number(theirs[at], 3)} N stated, {number(own[at], 3)} N half peak to peak in {tests[at][1].id}"
+    return [f"peak forces of {path.name} are in another order than those of the tests ({both})"]
 
 
 def _motion(record: Record) -> dict[str, float]:
