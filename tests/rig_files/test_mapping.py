@@ -14,7 +14,7 @@ from mrdamper.cli import application
 from mrdamper.errors import InputError
 from mrdamper.rig_files.conditions import currents_in
 from mrdamper.rig_files.mapping.proposals import damping_share
-from mrdamper.rig_files.mapping.results import results_in
+from mrdamper.rig_files.mapping.result_tables import results_in
 from mrdamper.rig_files.preview import question_of
 from mrdamper.rig_files.profile import CurrentSource, Profile, ProfileError, parse_profile
 from mrdamper.rig_files.quality import check_record

@@ -11,7 +11,7 @@ from support.rig_records import clean_record, codes_of, random_record, with_chan
 
 from mrdamper.errors import InputError
 from mrdamper.rig_files.conditions import currents_in
-from mrdamper.rig_files.mapping.results import results_in
+from mrdamper.rig_files.mapping.result_tables import results_in
 from mrdamper.rig_files.preview import guess_profile
 from mrdamper.rig_files.profile import Channel, Profile, parse_profile
 from mrdamper.rig_files.rig_import import import_files, read_run

@@ -24,7 +24,7 @@ from mrdamper.rig_files.mapping.completion import completed
 from mrdamper.rig_files.mapping.description import READ_FOLDERS, with_description, with_notes
 from mrdamper.rig_files.mapping.proposals import with_channels_by_physics, with_integrated_velocity, with_unit_of_time
 from mrdamper.rig_files.mapping.rasters import with_joined_rasters, with_one_clock
-from mrdamper.rig_files.mapping.results import form_of_tests, with_results
+from mrdamper.rig_files.mapping.result_tables import form_of_tests, with_results
 from mrdamper.rig_files.parts import tests_of, with_channels_as_columns
 from mrdamper.rig_files.profile import Profile, profile_hash, toml
 from mrdamper.rig_files.readers import ask_tables, raw_tables, suffixes

@@ -26,7 +26,8 @@ from mrdamper.rig_files.mapping.companions import holds_channels, is_helper, is_
 from mrdamper.rig_files.mapping.comparisons import contradictions, in_another_unit, repeated, stated_as_amplitudes
 from mrdamper.rig_files.mapping.description import SHORT_TEXTS, is_description, is_readme, short_lines
 from mrdamper.rig_files.mapping.proposals import is_integrated
-from mrdamper.rig_files.mapping.results import WITHIN, Results
+from mrdamper.rig_files.mapping.result_tables import WITHIN
+from mrdamper.rig_files.mapping.results import Results
 from mrdamper.rig_files.profile import Profile, profile_of
 from mrdamper.rig_files.quality import check_long_record
 from mrdamper.rig_files.quality.table import to_run

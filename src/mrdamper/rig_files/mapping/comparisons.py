@@ -83,11 +83,12 @@ def in_another_unit(records: Sequence[Record]) -> dict[int, Finding]:
         high = min((of[3] for of in same if of[2] > one[2] + _ALIKE_A), default=0.0)
         fits = [(k, u) for u, factor in _UNITS.items() for k in (factor, 1 / factor) if low < k * one[3] < high]
         if len(fits) == 1 and low > 0 and not low / _SEVERAL < one[3] < _SEVERAL * high:
+            factor, unit = fits[0]
             text = (
                 f"its force of {one[3]:.4g} N from peak to peak fits those at lower and higher currents ({low:.4g} and "
+                f"{high:.4g} N) times {factor:.4g} only, as of {unit}: state its unit in a profile of this file"
             )
-            fit = "times {:.4g} only, as of {}: state its unit in a profile of this file".format(*fits[0])
-            findings[i] = Finding("W_UNITS", f"{text}{high:.4g} N) {fit}")
+            findings[i] = Finding("W_UNITS", text)
     return findings
 
 

@@ -26,7 +26,7 @@ from mrdamper.rig_files.columns import units_in
 from mrdamper.rig_files.conditions import OTHER_DEVICE, stated_by_lines
 from mrdamper.rig_files.mapping import scales
 from mrdamper.rig_files.mapping.completion import NUMBERED, item_of, said_of_file, states_si, states_volts
-from mrdamper.rig_files.mapping.results import numbered_tests, with_small_units
+from mrdamper.rig_files.mapping.result_tables import numbered_tests, with_small_units
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import REQUIRED, Finding

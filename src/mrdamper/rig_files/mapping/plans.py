@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections import defaultdict
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,14 +12,16 @@ import numpy as np
 
 from mrdamper.data.wording import number
 from mrdamper.errors import InputError, QualityError, listed, printable
-from mrdamper.rig_files import column_names, conditions
+from mrdamper.rig_files import conditions
 from mrdamper.rig_files.coil_current import NO_CHANNEL
-from mrdamper.rig_files.column_names import Header, is_called, is_unit, names_condition, split_name, words, words_of
+from mrdamper.rig_files.column_names import is_called, words, words_of
 from mrdamper.rig_files.file_records import records_of_file
 from mrdamper.rig_files.mapping.comparisons import forces_grow
 from mrdamper.rig_files.mapping.completion import completed
 from mrdamper.rig_files.mapping.description import SHORT_TEXTS, short_lines, with_notes
-from mrdamper.rig_files.mapping.results import Results, lines_of, results_among, results_in, rows_below_heads
+from mrdamper.rig_files.mapping.name_schemes import Tests, by_example, by_legend, by_scheme, fields_of_names
+from mrdamper.rig_files.mapping.result_tables import lines_of, results_among, results_in
+from mrdamper.rig_files.mapping.results import Results, rows_below_heads
 from mrdamper.rig_files.profile import FileForm, Profile
 from mrdamper.rig_files.quality.motion import moves
 from mrdamper.rig_files.quality.view import View, strokes_of
@@ -28,20 +29,6 @@ from mrdamper.rig_files.readers import ask_tables, raw_tables
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import HEAD, Finding, Record, part_of_record
 
-_LEGEND = re.compile(  # I1 = 0.3 A, cur0.8 = coil current 0.8 A (as set)
-    r"[\s*`-]*(.{1,60}?)`?\s*(?:=|:|->)\s*([^\W\d_][^\d=:]{0,30}\s)?([0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(m?A)"
-    r"\s*(?:\([^()]*\))?\s*$"
-)
-_AT_SYMBOL = re.compile(r"(?<![^\W_])([A-Za-z]{1,8})([0-9]+(?:[.p][0-9]+)?)(?![^\W_])")  # I0p5
-_DECIMAL_CODE = re.compile(r"(?<![a-z])[a-z]{1,6}[0-9]+\.[0-9]+(?![0-9])")
-_SCHEME = re.compile(r"[\w.,+=-]*(?:<[^<>]{1,60}>[\w.,+=-]*)+")  # MRD_A<amplitude in mm>_I<coil current in A>.csv
-_ATTACHED, _JOINED = re.compile(r"(?<=\w)[(\[{]([^()\[\]{}<>]{1,60})[)\]}]"), re.compile(r"\w[(\[{][^_]*[)\]}]_")
-_PLACE = re.compile(r"[\s*`-]*([^\W\d_]{1,12})`?(?:\s*[=:]|\s+[-–]\s|\s{2,})\s*([^\s<>][^<>]{0,58}[^\s<>])\s*$")
-_NAME_IN_UNIT = re.compile(r"\b([^\W\d_]{3,})\s+(?:(?:is|are)\s+)?in\s+([^\W\d_]{1,3})\b")
-_SHARES = {"d": "tenths?|zehntel|dixièmes?", "c": "hundredths?|hundertstel|centièmes?", "m": "thousandths?|tausendstel"}
-_NUMBERS = re.compile(r"[\W\d_]*")
-_SCHEME_NUMBER = re.compile(r"[0-9]+(?:[.,xp][0-9]+)?")
-_CODE = re.compile(r"([A-Za-z]{1,6})([0-9]{1,3})(?:\s*(?:-|–|to|bis)\s*\1([0-9]{1,3}))?")  # I1 or test01-test04
 _DISCARDED, _DISCARDED_FLAG, _NOT_DISCARDED = (
     re.compile("(?i)" + "|".join(words(of))) for of in ("discarded", "discarded_flag", "not_discarded")
 )
@@ -52,12 +39,9 @@ _MOTIONS = (  # dimension and name of a column, relative difference of two tests
     ("length", re.compile(r"(?i)ampl|^x_?0$|^(?:stroke|hub|course|carrera|corsa)$|振幅|행정|行程"), 0.5, "mm", 1e3),
 )
 _PEAK = re.compile(r"(?i)peak|pico|picco|crête|spitze|max|峰|최대|пик|макс")
-_FEWEST_PEAKS, _PEAK_RATIO, _ALIKE = (
-    3,
-    1.3,
-    0.5,
-)  # tests; largest peak over the smallest; correlation of their logarithms
-_Tests = Sequence[tuple[Path, Record]]
+_FEWEST_PEAKS = 3  # tests whose peak forces are compared with a plan
+_PEAK_RATIO = 1.3  # largest peak force of a plan over the smallest from which they tell tests apart
+_ALIKE = 0.5  # correlation of the logarithms of peak forces below which their orders differ
 _REMARKS = frozenset((*words("notes"), *words("remarks")))
 _LABELS = words("specimen") | words("rig")
 _STAMP = re.compile(  # 20190603_140512, 2019-06-03T14:05:12
@@ -89,7 +73,7 @@ def results_of(path: Path, form: FileForm | None = None) -> Results | None:
     return several if len(sheets) > 1 else first
 
 
-def currents_beside(path: Path, results: Results | None, tests: _Tests) -> list[tuple[float, str]] | None:
+def currents_beside(path: Path, results: Results | None, tests: Tests) -> list[tuple[float, str]] | None:
     """Return the current [A] of every test and where it stands, by the first statement of a file that has each of them.
 
     The statements are those of its table of results, of a scheme of names and of a legend. None if there is none.
@@ -110,11 +94,11 @@ def currents_beside(path: Path, results: Results | None, tests: _Tests) -> list[
     rows = zip(results.cells, results.current, strict=True) if results and not results.of_supply else ()
     named = [([*filter(None, cells)], value) for cells, value in rows]  # Level, Current (A): L1, 0.35
     lines += [f"{names[0]}: {value:g} A" for names, value in named if names]
-    titled = _by_scheme(lines, results, tests) or _by_legend(lines, tests) or _by_example(lines, tests)
+    titled = by_scheme(lines, results, tests) or by_legend(lines, tests) or by_example(lines, tests)
     return [(current, f"{path.name}, {title}") for current, title in titled] or None
 
 
-def _by_rows(results: Results, tests: _Tests) -> Iterator[Mapping[int, float]]:
+def _by_rows(results: Results, tests: Tests) -> Iterator[Mapping[int, float]]:
     """Yield the current [A] of tests, by their place, by each way in which the rows of a table may name them."""
     called, files, folders = _called(tests), [file.name for file, _ in tests], [file.parent.name for file, _ in tests]
 
@@ -147,32 +131,7 @@ def _by_rows(results: Results, tests: _Tests) -> Iterator[Mapping[int, float]]:
     yield by_group(folders, by_name)
 
 
-def _by_legend(lines: Sequence[str], tests: _Tests) -> list[tuple[float, str]]:
-    """Return the current [A] and the code of every test, by a legend of codes that stand in names: I1 = 0.3 A."""
-    files = [{file.name.casefold(), file.stem.casefold()} for file, _ in tests]
-    called = set().union(*files)
-    stated, ratings = set(), False
-    for line in lines:
-        parts = re.split(r"\s*[;|]\s*|,\s+(?![^()]*\))|[.:]\s+(?=\w+ ?=)", line)
-        matches = [m for m in map(_LEGEND.match, parts) if m and (not m[2] or split_name(m[2]).role == "current")]
-        legends = [(name, conditions.amperes(m[3], m[4])) for m in matches for name in _meant(m[1], called)]
-        rating = (
-            not _NUMBERS.fullmatch(line) and column_names.RATING.search(line) is not None
-        )  # a record has many rows of numbers
-        stated |= {*legends} if not (rating or ratings) else set()
-        if line.strip() and not legends:  # a heading: Fuses
-            ratings = rating
-    names_of = [f"{file.stem} {record.id}".casefold() for file, record in tests]
-    stems = [re.sub(r"(?<=[A-Za-z])0+(?=[0-9])", "", name) for name in names_of]
-    words = [[*re.split(r"[^0-9A-Za-z]+", s), *_DECIMAL_CODE.findall(s.replace(",", "."))] for s in stems]
-    codes = _with_scale(dict(stated), {word for own in words for word in own})
-    if len(codes) < 2 or len(codes) < len(stated):
-        return []
-    own = [[code for code in codes if code in {*parts} | names] for parts, names in zip(words, files, strict=True)]
-    return [(codes[of[0]], of[0].upper()) for of in own] if all(len(of) == 1 for of in own) else []
-
-
-def other_motions(path: Path, results: Results | None, tests: _Tests) -> InputError | None:
+def other_motions(path: Path, results: Results | None, tests: Tests) -> InputError | None:
     """Return the refusal of a plan of which a test moves at another frequency, or by another amplitude, than its row.
 
     Amplitudes, which may be strokes peak to peak, are compared with each other.
@@ -198,7 +157,7 @@ def other_motions(path: Path, results: Results | None, tests: _Tests) -> InputEr
     return QualityError(printable(problem), where=path.name, remedy=remedy, code="E_MOTION_CONTRADICTS")
 
 
-def _other_peaks(path: Path, results: Results | None, tests: _Tests) -> list[str]:
+def _other_peaks(path: Path, results: Results | None, tests: Tests) -> list[str]:
     """Tell if the peak forces of a plan's rows are in another order than those of their tests.
 
     Peaks are with or without the gas force, or peak to peak, so their sizes are not compared.
@@ -224,7 +183,7 @@ def _motion(record: Record) -> dict[str, float]:
     return {"Hz": 1 / strokes.period, "mm": float(np.median(strokes.lengths)) / 2}
 
 
-def rows_beside(path: Path, results: Results | None, tests: _Tests) -> list[int]:
+def rows_beside(path: Path, results: Results | None, tests: Tests) -> list[int]:
     """Return the row of each test in a table of results; empty unless every test has one."""
     if results is None:
         return []
@@ -233,19 +192,19 @@ def rows_beside(path: Path, results: Results | None, tests: _Tests) -> list[int]
     return [int(row) for row, _ in stated] if {row for row, _ in stated} <= {*numbers} else []
 
 
-def labels_of(path: Path, results: Results | None, tests: _Tests, kind: str) -> list[str]:
+def labels_of(path: Path, results: Results | None, tests: Tests, kind: str) -> list[str]:
     """Return the specimen or rig of each test by a column of a plan or a scheme of names; empty unless all have one."""
     called = words(kind)
     rows = rows_beside(path, results, tests)
     heads = enumerate(results.keys if results else ())
     stated = [[results.cells[row][i] for row in rows] for i, key in heads if results and is_called(key, called)]
     lines = short_lines(path) if path.suffix.lower() in SHORT_TEXTS else []
-    stated += [texts for header, texts in _fields(lines, tests) if is_called(header.name, called)]
+    stated += [texts for header, texts in fields_of_names(lines, tests) if is_called(header.name, called)]
     stated = [texts for texts in stated if texts and all(texts) and (len({*texts}) < len(texts) or len(texts) == 1)]
     return stated[0] if len(stated) == 1 else []
 
 
-def discarded_tests(path: Path, results: Results | None, tests: _Tests) -> dict[int, InputError]:
+def discarded_tests(path: Path, results: Results | None, tests: Tests) -> dict[int, InputError]:
     """Return the refusal of each test that a remark in a plan calls invalid, aborted, repeated or a warm-up."""
     rows = [[*zip(results.keys, cells, strict=True)] for cells in results.cells] if results else []
     texts = [[f"{key}: {cell}" for key, cell in row if _discards(key, cell)] for row in rows]
@@ -285,7 +244,7 @@ def remarks_of(path: Path) -> Results | None:
     return None
 
 
-def cut_to_windows(path: Path, results: Results | None, tests: _Tests) -> dict[int, Record]:
+def cut_to_windows(path: Path, results: Results | None, tests: Tests) -> dict[int, Record]:
     """Return the tests of which a plan states a start and an end on each one's own clock or rows, cut to that.
 
     Those of another clock, which some of them do not have, stay whole, with a finding.
@@ -310,20 +269,20 @@ def cut_to_windows(path: Path, results: Results | None, tests: _Tests) -> dict[i
     return {i: part.noticed(note) for i, part in parts.items() if part.time.size < tests[i][1].time.size}
 
 
-def named_tests(results: Results | None, tests: _Tests) -> list[int]:
+def named_tests(results: Results | None, tests: Tests) -> list[int]:
     """Return the places of the tests that a table of results names, by more than a number."""
     cells = {cell.casefold() for row in (results.cells if results else ()) for cell in row if not cell.isdigit()}
     return [i for i, names in enumerate(_called(tests)) if (cells - {""}) & {name.casefold() for name in names}]
 
 
-def misfit_of_plan(path: Path, results: Results | None, tests: _Tests) -> Finding | None:
+def misfit_of_plan(path: Path, results: Results | None, tests: Tests) -> Finding | None:
     """Return the finding that a plan, which names most tests without a current, has one twice or lacks others."""
     text = results.misfit(_called(tests)) if results else ""
     problem = printable(f"{NO_CHANNEL}missing: {path.name} {text}: if so, correct the plan")
     return Finding("W_COLUMN", problem) if text else None
 
 
-def currents_listed(path: Path, tests: _Tests) -> list[tuple[float, str]] | None:
+def currents_listed(path: Path, tests: Tests) -> list[tuple[float, str]] | None:
     """Return the current [A] of every test and where it stands, by the only list of currents in a text: 0, 0.5 and 1 A.
 
     None unless the names of the tests, or of those of each file, count as many, alike in motion, and their forces grow
@@ -344,96 +303,7 @@ def currents_listed(path: Path, tests: _Tests) -> list[tuple[float, str]] | None
     return [(stated[i], title) for i in range(len(tests))] if len(stated) == len(tests) else None
 
 
-def _with_scale(codes: dict[str, float], words: Collection[str]) -> dict[str, float]:
-    """Add the codes of zero, and of decimals in amperes, by others of one scale: I00 by I05 = 0.5 A and I15 = 1.5 A."""
-    parted = {code: m for code in {*codes, *words} if (m := re.fullmatch(r"([a-z]+)([0-9]+(?:\.[0-9]+)?)", code))}
-    scales: dict[str, list[float]] = defaultdict(list)
-    for code, current in codes.items():
-        if code in parted and float(parted[code][2]):
-            scales[parted[code][1]].append(round(current / float(parted[code][2]), 9))
-    more = {}
-    for code, match in parted.items():
-        number, scale = float(match[2]), scales[match[1]]
-        if len({*scale}) == 1 and ((number == 0 and len(scale) > 1) or ("." in code and scale[0] == 1)):
-            more[code] = number * scale[0]
-    return {**more, **codes}
-
-
-def _by_scheme(lines: Sequence[str], results: Results | None, tests: _Tests) -> list[tuple[float, str]]:
-    """Return the current [A] of each test by a scheme of names of files, or the number in it and a table of results.
-
-    Thus <coil current in A>, or <duty %> with a table of the current by the duty; empty unless all files have one.
-    """
-    stated = set[tuple[float, ...]]()
-    for header, texts in _fields(lines, tests):
-        numbers = [conditions.amperes(text, "") for text in texts if _SCHEME_NUMBER.fullmatch(text)]
-        at = [i for i, key in enumerate(results.keys if results else ()) if header.name and key == header.name]
-        rows = zip(results.cells, results.current, strict=True) if results and len(at) == 1 else ()
-        by_number = {
-            conditions.amperes(m[0], ""): of for cells, of in rows if (m := _SCHEME_NUMBER.match(cells[at[0]]))
-        }
-        if header.dimension == "current" and names_condition(header.name, "current"):
-            by_number = {number: header.factor * number for number in numbers}
-        if len(numbers) == len(tests) and {*numbers} <= {*by_number}:
-            stated.add(tuple(by_number[number] for number in numbers))
-    return [(current, "the names of files") for current in stated.pop()] if len(stated) == 1 else []
-
-
-def _fields(lines: Sequence[str], tests: _Tests) -> Iterator[tuple[Header, list[str]]]:
-    """Yield the places in the names of files that a scheme of them has, each with what stands there in every name.
-
-    Thus MRD_I<coil current in A>_f<Hz> or MRD_I(coil current, A)_f(Hz); what a letter or word stands for, a line of its
-    own may tell, or its own name: MRD_iiii_ff.csv, iiii: coil current in mA; current_frequency with current in A.
-    """
-    for sign, share in _SHARES.items():  # hundredths of an ampere
-        lines = [re.sub(rf"(?i)\b(?:{share}) (?:of )?(?:an? |d')?amp[eè]res?\b", f"{sign}A", line) for line in lines]
-    named = (m.groups() for line in lines for m in _NAME_IN_UNIT.finditer(line))
-    meant = {name: f"{name} in {unit}" for name, unit in named if is_unit(unit) or unit in ("cA", "dA")}
-    meant |= {m[1]: m[2] for m in map(_PLACE.match, lines) if m}
-    names = [name for line in lines for name in re.findall(r"\w+_[\w.]+", line) if meant]
-    schemes = [re.sub("[^\\W\\d_]+", lambda m: f"<{meant[m[0]]}>" if m[0] in meant else m[0], name) for name in names]
-    schemes += [_ATTACHED.sub(r"<\1>", line) if _JOINED.search(line) else line for line in lines]
-    stated = [match[0].rstrip(".,") for scheme in schemes if "<" in scheme for match in _SCHEME.finditer(scheme)]
-    for parts in (re.split("<([^<>]*)>", scheme) for scheme in stated):
-        pattern = "".join("([^_]+?)" if i % 2 else re.escape(part) for i, part in enumerate(parts))
-        matches = [re.fullmatch(pattern, file.stem) or re.fullmatch(pattern, file.name) for file, _ in tests]
-        texts = zip(*(m.groups() for m in matches if m), strict=True) if all(matches) else ()
-        places = (split_name(meant.get(place, place)) for place in parts[1::2])
-        yield from ((place, list(own)) for place, own in zip(places, texts, strict=False))
-    keyed = [dict(part.split("=", 1) for part in file.stem.split("_") if "=" in part) for file, _ in tests]
-    cells = [cell.strip(" `*-.") for line in lines for cell in re.split(r"[,;]\s|: ", line)]
-    for key in set.intersection(*map(set, keyed)) if keyed else ():  # I=0.5_freq=2.csv, I coil current in A
-        stated = {cell.removeprefix(key).strip("` ") for cell in cells if re.match(rf"{re.escape(key)}\W", cell)}
-        yield from ((split_name(text), [own[key] for own in keyed]) for text in (stated if len(stated) == 1 else ()))
-
-
-def _by_example(lines: Sequence[str], tests: _Tests) -> list[tuple[float, str]]:
-    """Return the current [A] of each test by the number in its name, as a line explains one: I0p5_f2p5 means 0.5 A."""
-    stated = set[float]()
-    for line in filter(conditions.EXPLAINED.search, lines):
-        currents, numbers = conditions.currents_in(line), _numbers_of_currents(line)
-        stated |= {current / number for current in currents for number in numbers if len(numbers) == 1 and number}
-    named = [_numbers_of_currents(record.id) for _, record in tests]
-    whole = len(stated) == 1 and all(len(numbers) == 1 for numbers in named)
-    return [(scale * of[0], "an example of names") for of in named for scale in stated] if whole else []
-
-
-def _numbers_of_currents(name: str) -> list[float]:
-    """Return the numbers behind symbols and words for a current in a name: I0p5_f2p5."""
-    return [conditions.amperes(m[2], "A") for m in _AT_SYMBOL.finditer(name) if split_name(m[1]).role == "current"]
-
-
-def _meant(key: str, files: Collection[str]) -> list[str]:
-    """Return the codes that the key of a legend names, or the file: I1, test01-test04, a.dat."""
-    code = _CODE.fullmatch(key)
-    if code is None and _DECIMAL_CODE.fullmatch(key.casefold().replace(",", ".")):
-        return [key.casefold().replace(",", ".")]
-    if code is None:
-        return [key.casefold()] if key.casefold() in files else []
-    return [f"{code[1].casefold()}{number}" for number in range(int(code[2]), int(code[3] or code[2]) + 1)]
-
-
-def within_ranges(tests: _Tests, results: Results | None) -> _Tests:
+def within_ranges(tests: Tests, results: Results | None) -> Tests:
     """Return the tests that have a row in a table of results, between the starts and ends it states, if it does.
 
     A record of several rows is cut into a test for each. Where a column names the files, each has to have a row.
@@ -467,7 +337,7 @@ def _cut_at(parts: Sequence[slice], record: Record) -> Finding:
     return Finding("W_CUT", text)
 
 
-def _called(tests: _Tests) -> list[tuple[str, ...]]:
+def _called(tests: Tests) -> list[tuple[str, ...]]:
     """Names of each test: its own, of its file, its own without that, of its block, and with its folders."""
     names = []
     for file, record in tests:
@@ -479,7 +349,7 @@ def _called(tests: _Tests) -> list[tuple[str, ...]]:
 
 
 def _head(record: Record) -> list[str]:
-    """Return the lines above a test that state one word or number by its name."""
+    """Return the lines above a test that hold a name and a value."""
     return record.provenance.get(HEAD, "").split("; ")
 
 
