@@ -31,7 +31,7 @@ def words(kind: str) -> frozenset[str]:
 
 def sentences(kind: str) -> tuple[re.Pattern[str], ...]:
     """Return the forms of sentences or names of a kind: sampling rates of rows, names of files of notes, ..."""
-    return tuple(map(re.compile, TABLES["sentences"][kind]))
+    return tuple(re.compile(re.sub(r"(?:^|\n) *", "", form)) for form in TABLES["sentences"][kind])
 
 
 def meanings(table: str) -> dict[str, str]:
