@@ -188,7 +188,7 @@ def test_both_leave_by_the_command_line(tmp_path):
     assert CliRunner().invoke(application(), [*export, "c"]).exit_code == 0
     header = (tmp_path / "inverse/bench_inverse.h").read_text()
     assert "wanted; /* N */" in header
-    assert "outside lowest to highest, the nearer of these is reached" in header
+    assert "outside lowest to highest is answered by the nearer of them" in header
     export[3] = str(tmp_path / "inverse.fmu")
     assert CliRunner().invoke(application(), [*export, "fmu"]).exit_code == 0
     assert "wanted" in zipfile.ZipFile(tmp_path / "inverse.fmu").read("modelDescription.xml").decode()

@@ -118,8 +118,8 @@ def _by_motion(damper: Damper, prediction: Prediction) -> Floats:
     """(N, K) changes of a predicted force [N] if the parameters were those of one of K tested motions throughout.
 
     Parameters that depend on frequency and amplitude were identified on sines. Along another motion they are those of
-    an equivalent sine, and no test shows how well it represents the motion. They are zero where the parameters do not
-    depend on the motion, or where motions other than sines were tested.
+    an equivalent sine, and no test shows how well it represents the motion. The changes are zero where the parameters
+    do not depend on the motion, or where motions other than sines were tested.
     """
     hull = damper.tested_motions if prediction.untested_kind else None
     held = [

@@ -72,7 +72,7 @@ def shares_between(current: Floats, levels: Floats) -> tuple[Floats, NDArray[np.
 
 
 def _current_distances(current: Floats, levels: Floats, changing: bool) -> tuple[Floats, Floats]:
-    """Products of the distances to the two nearest levels, between and beyond them, each over its square."""
+    """Products of the distances to the two nearest levels, as the first two numbers of `Distance`."""
     largest = float(levels[-1]) or 1.0
     outside = np.maximum(np.maximum(levels[0] - current, current - levels[-1]) / largest - _CURRENT_TOLERANCE, 0)
     if changing:  # a record passes through all currents between its ends

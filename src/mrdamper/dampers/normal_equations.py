@@ -14,6 +14,7 @@ from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -342,19 +343,15 @@ def _with_nearer_rates(
 ) -> tuple[dict[str, Law], JointFunctionFit]:
     """Return the chosen forms with the rates of smallest error near those of the grid, and their fit."""
     fit, _ = _tried(data, forms, start)
-    for name, law in forms.items():
-        for factor in _RATE_FACTORS if law.rates else ():
-            while True:
-                law = forms[name]
-                (low, high), (rate,) = law.form.rate_bounds[0], law.rates
-                trial = {**forms, name: Law(law.name, (rate * factor,))}
-                if not low < rate * factor < high:
-                    break
-                other, _ = _tried(data, trial, start)
-                gain = 1 - np.mean(other.nrmse_pp) / np.mean(fit.nrmse_pp)
-                if gain < _MIN_RATE_GAIN or broken_law(other.parameters.functions[name], data.conditions, units[name]):
-                    break
-                forms, fit = trial, other
+    for name, factor in product([name for name, law in forms.items() if law.rates], _RATE_FACTORS):
+        low, high = forms[name].form.rate_bounds[0]
+        while low < (rate := forms[name].rates[0] * factor) < high:
+            trial = {**forms, name: Law(forms[name].name, (rate,))}
+            other, _ = _tried(data, trial, start)
+            function, gain = other.parameters.functions[name], 1 - np.mean(other.nrmse_pp) / np.mean(fit.nrmse_pp)
+            if gain < _MIN_RATE_GAIN or (name in units and broken_law(function, data.conditions, units[name])):
+                break
+            forms, fit = trial, other
     return forms, fit
 
 
