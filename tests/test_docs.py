@@ -10,6 +10,7 @@ from support.dampers import joint_damper
 from support.fmu_files import fmu_bytes
 from typer.testing import CliRunner
 
+from mrdamper import discovery
 from mrdamper.cli import application
 from mrdamper.dampers.model_file import save_model
 
@@ -49,7 +50,11 @@ GIVEN = {
 
 
 def run_page(page, monkeypatch, folder, *, slow):
-    """Python blocks share their names, commands their folder, as a reader's would."""
+    """Python blocks share their names, commands their folder, as a reader's would; their classes end with them."""
+    for registry in discovery._registries.values():
+        registry.all()
+        for name in ("_types", "_parts"):
+            monkeypatch.setattr(registry, name, dict(getattr(registry, name)))
     monkeypatch.chdir(folder)
     GIVEN.get(page.stem, lambda: None)()
     monkeypatch.setenv("MPLBACKEND", "agg")
