@@ -49,6 +49,18 @@ def test_names_listed_in_a_remark_with_other_separators_and_the_sense_of_a_load_
     expect(tmp_path, 0.5)
 
 
+@pytest.mark.parametrize("between", ["\t", "   "])
+def test_a_list_of_channels_has_cells_between_tabs_or_columns_of_spaces(tmp_path, between):
+    """Only a list without tabs has its cells between spaces: a name may hold two."""
+    clock = "Zeit  1 - Standardmessrate" if between == "\t" else "Time"
+    channels = [("1", clock, "s", "500"), ("2", "Stroke", "mm", "500"), ("3", "Load", "N", "500")]
+    head = [between.join(cells) for cells in [("No", "Name", "Unit", "Rate"), *channels]]
+    head += ["", "\t".join(cells[1] for cells in channels)]
+    lines = ["\t".join(f"{value:.6g}" for value in row) for row in zip(T, X, force(0.5), strict=True)]
+    (tmp_path / "a_0.5A.asc").write_text("\n".join([*head, *lines, ""]))
+    expect(tmp_path, 0.5)
+
+
 @pytest.mark.parametrize("line", ["Units: force=N, time=s, displacement=mm", "time = s; displacement = mm; force = N"])
 def test_a_line_gives_every_channel_its_unit_behind_an_equals_sign(tmp_path, line):
     table(tmp_path / "a_0.5A.txt", [line, "time,displacement,force"], T, X, force(0.5))

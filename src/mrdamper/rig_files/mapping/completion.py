@@ -18,7 +18,7 @@ from mrdamper.rig_files.mapping.clocks import with_axis_as_time, with_epoch
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding
 from mrdamper.rig_files.text.layout import LISTED, X_VALUE
-from mrdamper.rig_files.text.row_samples import cells_of
+from mrdamper.rig_files.text.row_samples import cells_of, cells_of_list
 from mrdamper.rig_files.text.tokens import looks_numeric, number
 
 _SEPARATORS = ("\t", ";", ",", "|")
@@ -377,7 +377,7 @@ def _with_listed_units(table: RawTable) -> RawTable:
     listed: dict[int, set[str]] = {}
     doubtful: dict[int, set[str]] = {}  # of a range, a figure or a numbered device: may contradict the others
     for line in table.lines if names else ():
-        cells = [cell.strip(' "') for cell in re.split(r"[,;|\t]| {2,}", line.lstrip("#%/ "))]
+        cells = cells_of_list(line.lstrip("#%/ "))
         behind_colon = [cell.partition(": ")[2] for cell in cells]  # rig 7, columns: time [s], load [N]
         for text, whole in zip((*cells, *behind_colon, line), (*cells, *cells, line), strict=True):
             header = item_of(text)

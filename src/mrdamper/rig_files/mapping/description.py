@@ -31,6 +31,7 @@ from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import REQUIRED, Finding
 from mrdamper.rig_files.text.elements import numbers_in, root_of, tree_of
+from mrdamper.rig_files.text.row_samples import cells_of_list
 from mrdamper.rig_files.text.stream import decoded
 
 _MARKDOWN = (".md", ".rmd", ".qmd")
@@ -145,7 +146,7 @@ def _lacks_names_or_units(table: RawTable) -> bool:
 
 def _of_channels(line: str) -> str:
     """Return what a line states of channels: a scale, a unit, or as "channel 2: load N" what a number stands for."""
-    cells = [cell.strip().strip('"') for cell in re.split(r"[,;\t|]| {2,}", line.strip(" |"))]
+    cells = cells_of_list(line.strip(" |"))
     numbered = len(cells) > 2 and cells[0].isascii() and cells[0].isdigit()
     if numbered and (split_name("", cells[-1]).known or scales.scales_in(cells[-1])):
         return f"channel {cells[0]}: {' '.join(cells[1:])}"

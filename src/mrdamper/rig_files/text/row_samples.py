@@ -117,6 +117,12 @@ def cells_of(line: str, separator: str) -> list[str]:
         return line.split(separator)
 
 
+def cells_of_list(line: str) -> list[str]:
+    """Return the bare cells of a line of a list: between commas, bars or the like, or between columns of spaces."""
+    by_marks = re.split(r"[,;|\t]", line)
+    return [cell.strip(' "') for cell in (by_marks if len(by_marks) > 1 else re.split(" {2,}", line))]
+
+
 def content_of(lines: Sequence[str]) -> list[tuple[int, str]]:
     """Return the lines that are no remarks, with their places."""
     return [row for row in enumerate(lines) if row[1][:1] in _DIGITS or (row[1].strip() and not is_comment(row[1]))]
