@@ -27,36 +27,18 @@ from mrdamper.rig_files.text.row_samples import cells_of
 from mrdamper.rig_files.text.tokens import looks_numeric
 
 _QUANTITY = re.compile(rf"({NUMBER.pattern})\s*(m?A)")
-
-
 WITHIN = "table of results"  # within the file of its tests: beginning of where their currents stand
-
-
 _RULE = re.compile(r"[-=+|:\s]{3,}")  # below the names of columns
-
-
 _SUPPLY = re.compile(r"(?i)\b(?:power[ _-]?)?suppl(?:y|ied)\b|\bpsu\b")
-
-
 _FEWEST_ROWS = _TELLING = 2
-
-
 _MOST_ROWS, _MOST_COLUMNS = 2000, 60  # of a table of results
-
-
 _TO = r"\s*(?:[-–]|\.{2,3}|\b(?:to|bis|do|à|au|a|al|até|se)\b)\s*"
-
-
 _NUMBERS = re.compile(rf"([0-9]{{1,4}})(?:{_TO}([0-9]{{1,4}}))?")
-
-
 _LISTED_TEST = re.compile(  # Step 3: ...; tests 1 - 4: ...; files p01 to p04: ...; T1 se T4 tak: ...; 3. test: ...
     r"[\s#%*\"-]*(?:(?P<place>[0-9]{1,6})[.)]\s*(?P<word>[^\W\d_]{2,20})"
     r"|(?P<name>[^\W\d_][^\d:=]{0,30}?)[\s_.#-]*(?P<number>[0-9]{1,6})(?:"
     rf"{_TO}(?:[^\W\d_]{{1,30}}[\s_.#]*)?(?P<last>[0-9]{{1,6}})(?:\s+tak)?)?)\s*[:=;,\t)]"
 )
-
-
 _MEASURED = tuple(words("measured"))
 
 
