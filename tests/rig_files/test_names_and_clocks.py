@@ -133,6 +133,7 @@ def test_nanoseconds_since_1970_need_no_unit_and_smaller_counts_do(tmp_path):
         (["run9_2A", "run10_1A"], [2.0, 1.0]),
         (["run1_1A", "run2_1A", "run3_0A", "run4_2A"], [1.0, 1.0, 0.0, 2.0]),  # counts the tests
         (["MRD-7_0A/a", "MRD-7_1A/a", "MRD-7_500mA/a"], [0.0, 1.0, 0.5]),
+        (["MRD_0A0_2Hz", "MRD_0A5_2Hz", "MRD_1A0_2Hz"], [0.0, 0.5, 1.0]),  # the letter stands for the mark
         (["t2_5A", "t0_5A", "t1_0A", "t2_0A"], None),
         (["I1_0A", "I1_1A", "I1_2A"], None),
         (["t_1_0A", "t_1_1A", "t_1_2A"], None),
@@ -166,6 +167,15 @@ def test_a_digit_before_the_current_is_part_of_a_label_where_the_other_names_sho
     number = float(written[1].partition("=")[2].strip(" }"))
     assert answered.records
     assert {float(np.mean(record.current)) for record in answered.records} == {number}
+
+
+@pytest.mark.parametrize("names", [["D_1A1", "D_2A1", "D_3A1"], ["D_0A0", "D_0A5"], ["D_0A0", "E_0A5", "F_1A0"]])
+def test_a_letter_between_digits_is_no_decimal_mark_without_zero_and_a_third_number_beside_it(tmp_path, names):
+    for i, name in enumerate(names):
+        table = np.column_stack([TIME, (15 + i) * np.sin(PHASE), (1 + 0.1 * i) * force(PHASE)])
+        header = "time [s],displacement [mm],force [N]"
+        np.savetxt(tmp_path / f"{name}.csv", table, "%.6g", ",", header=header, comments="")
+    assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} == {"E_CURRENT_MISSING"}
 
 
 def test_folders_of_a_profile_may_be_all_that_a_path_has(tmp_path, monkeypatch):

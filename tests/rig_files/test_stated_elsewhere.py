@@ -279,7 +279,7 @@ def test_two_currents_are_named_where_either_may_be_that_of_the_coil(tmp_path):
     [
         "Comment: current raised by 0.4 A every 8 cycles", "coil current checked at 1 A, then switched off",
         "coil current step 0.5 A", "Spulenstrom um 0,4 A erhöht", "Coil current (zero-check): 0.00 A",
-        "Courant augmenté de 0,5 A", "steps of 0.5 A",
+        "Courant augmenté de 0,5 A", "steps of 0.5 A", "LMS Test.Lab Rev 14A", "cCC: tenths of an ampere (c05 = 0.5 A)",
     ],
 )  # fmt: skip
 def test_a_line_about_a_change_or_a_check_of_the_current_states_none(line, tmp_path):
@@ -743,10 +743,14 @@ def test_the_day_of_a_test_is_that_of_its_own_lines(tmp_path, lines, note):
         (['"Sample Rate","500.000","Hz","","Duration","3.000","s"', "Time [s],Displacement [mm],Force [N]"], 1),
         (["Sampling frequency: 500 Hz", "Time,Displacement [mm],Force [N]"], 1e3),
         (["Time [s],Stroke (in.),Force [N]"], 1),
+        (["Logger 0.7, 500 SPS", "format: millis,displacement_mm,force_N"], 1e3),
         (["Var1,Var2,Var3"], 1),
     ],
-    ids=["another number of the line is no step", "only ms agree with the rate", "in.", "a README of the folder above"],
-)
+    ids=[
+        "another number of the line is no step", "only ms agree with the rate", "in.", "behind a word for names",
+        "a README of the folder above",
+    ],
+)  # fmt: skip
 def test_names_and_units_are_read_as_a_careful_reader_does(head, scale, tmp_path):
     if "Var1" in head[0]:
         (tmp_path / "README.txt").write_text("Var1: time (s)\nVar2: displacement (mm)\nVar3: force (N)\n")
@@ -754,6 +758,14 @@ def test_names_and_units_are_read_as_a_careful_reader_does(head, scale, tmp_path
     folder.mkdir()
     table(folder / "a.csv", head, scale * T, X / (25.4 if "in." in head[0] else 1), force(0.5))
     expect(folder, 0.5)
+
+
+def test_the_sense_in_a_table_of_columns_is_no_channel(tmp_path):
+    text = "| no. | name | description | unit |\n|---|---|---|---|\n| 1 | t | time | s |\n| 2 | d | stroke | mm |\n"
+    (tmp_path / "README.md").write_text(f"{text}| 3 | f | force on the rod, positive in compression | N |\n")
+    table(tmp_path / "a_0.5A.csv", ["t,d,f"], T, X, -force(0.5))
+    expect(tmp_path, 0.5)
+    assert import_files([tmp_path]).records[0].provenance["sign_changed"] == "force"
 
 
 def test_the_nearest_readme_states_the_scale(tmp_path):

@@ -209,11 +209,13 @@ def with_current_behind_label(record: Record, path: Path, names: Collection[str]
 
     The first of its names that states a current at all counts.
     """
-    place = next(filter(conditions.behind_digits, _places(record, path)), "")
+    unclear = (conditions.behind_digits, conditions.letter_as_mark)
+    place = next((name for name in _places(record, path) if any(of(name) for of in unclear)), "")
     current = conditions.current_behind_label(place, names)
     if current is None:
         return record
-    note = f"{place!r} is read as {current:g} A: by the other names, the digit before it is part of a label"
+    why = "the digit before it is part of a label" if conditions.behind_digits(place) else "A is its decimal mark"
+    note = f"{place!r} is read as {current:g} A: by the other names, {why}"
     return with_stated_current(record, current, f"the name {place!r}", place, note)
 
 

@@ -149,7 +149,9 @@ def _of_channels(line: str) -> str:
     cells = cells_of_list(line.strip(" |"))
     numbered = len(cells) > 2 and cells[0].isascii() and cells[0].isdigit()
     if numbered and (split_name("", cells[-1]).known or scales.scales_in(cells[-1])):
-        return f"channel {cells[0]}: {' '.join(cells[1:])}"
+        senses = [cell for cell in cells if scales.senses_in(cell)]  # positive in compression
+        meaning = " ".join(cell for cell in cells[1:] if cell not in senses)
+        return ", ".join([f"channel {cells[0]}: {meaning}", *senses])
     if len(cells) > 1 and split_name(cells[0]).role and all(c.isascii() and c.isdigit() for c in cells[1:]):
         return f"channel {cells[1]}: {cells[0]}"  # a tag with its index, and its type
     units = [item_of(cell).unit or cell.rpartition(":")[2].strip() for cell in cells]

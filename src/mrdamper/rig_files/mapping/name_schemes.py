@@ -17,35 +17,16 @@ _LEGEND = re.compile(  # I1 = 0.3 A, cur0.8 = coil current 0.8 A (as set)
     r"[\s*`-]*(.{1,60}?)`?\s*(?:=|:|->)\s*([^\W\d_][^\d=:]{0,30}\s)?([0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(m?A)"
     r"\s*(?:\([^()]*\))?\s*$"
 )
-
-
 _AT_SYMBOL = re.compile(r"(?<![^\W_])([A-Za-z]{1,8})([0-9]+(?:[.p][0-9]+)?)(?![^\W_])")  # I0p5
-
-
 _DECIMAL_CODE = re.compile(r"(?<![a-z])[a-z]{1,6}[0-9]+\.[0-9]+(?![0-9])")
-
-
 _SCHEME = re.compile(r"[\w.,+=-]*(?:<[^<>]{1,60}>[\w.,+=-]*)+")  # MRD_A<amplitude in mm>_I<coil current in A>.csv
-
-
 _ATTACHED, _JOINED = re.compile(r"(?<=\w)[(\[{]([^()\[\]{}<>]{1,60})[)\]}]"), re.compile(r"\w[(\[{][^_]*[)\]}]_")
-
-
 _PLACE = re.compile(r"[\s*`-]*([^\W\d_]{1,12})`?(?:\s*[=:]|\s+[-–]\s|\s{2,})\s*([^\s<>][^<>]{0,58}[^\s<>])\s*$")
-
-
 _NAME_IN_UNIT = re.compile(r"\b([^\W\d_]{3,})\s+(?:(?:is|are)\s+)?in\s+([^\W\d_]{1,3})\b")
-
-
 _SHARES = {"d": "tenths?|zehntel|dixièmes?", "c": "hundredths?|hundertstel|centièmes?", "m": "thousandths?|tausendstel"}
-
-
 _NUMBERS = re.compile(r"[\W\d_]*")
-
-
+_IN_EXAMPLE = re.compile(r"\s*\([A-Za-z]+[0-9]\w*\s*=[^()]*\)")  # (c05 = 0.5 A)
 _SCHEME_NUMBER = re.compile(r"[0-9]+(?:[.,xp][0-9]+)?")
-
-
 _CODE = re.compile(r"([A-Za-z]{1,6})([0-9]{1,3})(?:\s*(?:-|–|to|bis)\s*\1([0-9]{1,3}))?")  # I1 or test01-test04
 
 
@@ -95,7 +76,9 @@ def by_scheme(lines: Sequence[str], results: Results | None, tests: Tests) -> li
     """
     stated = set[tuple[float, ...]]()
     for header, texts in fields_of_names(lines, tests):
-        numbers = [conditions.amperes(text, "") for text in texts if _SCHEME_NUMBER.fullmatch(text)]
+        prefix = re.split("[^A-Za-z]", texts[0], maxsplit=1)[0]  # c of c05 and c10
+        numbers = [t.removeprefix(prefix) for t in texts if t.startswith(prefix)]
+        numbers = [conditions.amperes(number, "") for number in numbers if _SCHEME_NUMBER.fullmatch(number)]
         at = [i for i, key in enumerate(results.keys if results else ()) if header.name and key == header.name]
         rows = zip(results.cells, results.current, strict=True) if results and len(at) == 1 else ()
         by_number = {
@@ -118,7 +101,7 @@ def fields_of_names(lines: Sequence[str], tests: Tests) -> Iterator[tuple[Header
         lines = [re.sub(rf"(?i)\b(?:{share}) (?:of )?(?:an? |d')?amp[eè]res?\b", f"{sign}A", line) for line in lines]
     named = (m.groups() for line in lines for m in _NAME_IN_UNIT.finditer(line))
     meant = {name: f"{name} in {unit}" for name, unit in named if is_unit(unit) or unit in ("cA", "dA")}
-    meant |= {m[1]: m[2] for m in map(_PLACE.match, lines) if m}
+    meant |= {m[1]: _IN_EXAMPLE.sub("", m[2]) for m in map(_PLACE.match, lines) if m}
     names = [name for line in lines for name in re.findall(r"\w+_[\w.]+", line) if meant]
     schemes = [re.sub("[^\\W\\d_]+", lambda m: f"<{meant[m[0]]}>" if m[0] in meant else m[0], name) for name in names]
     schemes += [_ATTACHED.sub(r"<\1>", line) if _JOINED.search(line) else line for line in lines]

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from mrdamper.rig_files.column_names import KEYS, RATING, is_unit, parse_unit, role_of, split_name, words
+from mrdamper.rig_files.column_names import KEYS, RATING, is_unit, parse_unit, role_of, sentences, split_name, words
 from mrdamper.rig_files.conditions import CELL, OTHER_DEVICE, stated_clock
 from mrdamper.rig_files.readers.arrays import Array, array_table, columns_of
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, NoTableError, RawTable, RigFileError, Source
@@ -29,7 +29,7 @@ DEEPEST = 8  # levels
 MOST_TEXT = 200  # characters
 _HEAD = re.compile(r"_?(?:header|info|properties|attributes|meta(?:data)?)$", re.IGNORECASE)
 _BODY = re.compile(r"_?(?:data|values)$", re.IGNORECASE)
-_LISTING = re.compile(r"(?i)^\s*(?:columns?|channels?|spalten|kanäle|colonnes|names)\s*[:=]\s*")
+(_LISTING,) = sentences("listing")
 _DIRECTION = re.compile(r":[+-]?[SXYZ]$")  # of a point of measurement
 _CLOCK = re.compile(r"(^|[_. ])time[_. ]", re.IGNORECASE)
 

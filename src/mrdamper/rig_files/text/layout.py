@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import accumulate
 from string import ascii_uppercase
 
-from mrdamper.rig_files.column_names import UNIT_KEYS, is_unit, role_of, split_name, words
+from mrdamper.rig_files.column_names import UNIT_KEYS, is_unit, role_of, sentences, split_name, words
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RigFileError, Source
 from mrdamper.rig_files.text import row_samples as sampling
@@ -28,7 +28,7 @@ _UNIT_OF_ALL = re.compile(  # ; Unit: V, above the only column
     rf"(?i)[\s#%;\"]*(?:(?:y|vertical|channel|signal|data)[ _-]*)?(?:{'|'.join(UNIT_KEYS)})\"?"
     r"\s*[:=,;\t]\s*\"?([^\s\",;]+)[\s\",;]*$"
 )
-_LISTING = re.compile(r"(?i)^\s*(?:columns?|channels?|fields?|spalten|kanäle|colonnes|header|names)\s*[:=]\s*")
+(_LISTING,) = sentences("listing")
 _NOTES = words("notes")
 _MOST_LEVELS = 4  # lines of headings
 _TYPE = re.compile(r"[a-z]{1,6}[0-9]{1,2}")  # f8, int16
@@ -327,8 +327,7 @@ def _keyed_lines(cells: Mapping[int, Sequence[str]], roles: Mapping[int, int]) -
 def _fields(line: str, separator: str, width: int) -> list[str]:
     """Cells of a line of names; remark signs and one trailing separator are taken off."""
     listed = is_comment(line)
-    if listed:
-        line = _LISTING.sub("", sampling.COMMENT.sub("", line, count=1))
+    line = _LISTING.sub("", sampling.COMMENT.sub("", line, count=1) if listed else line)
     if separator == SPACES:
         wide = re.split(r"\s{2,}|\t", line.strip())
         narrow = line.split()
