@@ -7,8 +7,8 @@ from collections import defaultdict
 from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 
-from mrdamper.rig_files import column_names, conditions
-from mrdamper.rig_files.column_names import Header, is_unit, names_condition, split_name
+from mrdamper.rig_files import conditions
+from mrdamper.rig_files.column_names import RATING, Header, is_unit, names_condition, split_name
 from mrdamper.rig_files.mapping.results import Results
 from mrdamper.rig_files.record import Record
 
@@ -40,7 +40,7 @@ def by_legend(lines: Sequence[str], tests: Tests) -> list[tuple[float, str]]:
         matches = [m for m in map(_LEGEND.match, parts) if m and (not m[2] or split_name(m[2]).role == "current")]
         legends = [(name, conditions.amperes(m[3], m[4])) for m in matches for name in _meant(m[1], called)]
         # A record has many rows of numbers.
-        rating = not _NUMBERS.fullmatch(line) and column_names.RATING.search(line) is not None
+        rating = not _NUMBERS.fullmatch(line) and RATING.search(line) is not None
         stated |= {*legends} if not (rating or ratings) else set()
         if line.strip() and not legends:  # a heading: Fuses
             ratings = rating
