@@ -309,6 +309,16 @@ def test_a_heading_of_another_amplitude_is_reported_and_refused_at_the_factor_of
     assert [c for c in codes if c in ("W_NAME", "E_MOTION_CONTRADICTS")] == [code] * bool(code)
 
 
+def test_a_frequency_with_a_decimal_comma_in_a_heading_is_compared(tmp_path):
+    channels = {"time [s]": T.tolist(), "displacement [mm]": X.tolist()}
+    titles = {"I = 0,5 A, f = 2,5 Hz": 0.5, "I = 1,5 A": 1.5}
+    tests = {title: {**channels, "force [N]": force(amperes).tolist()} for title, amperes in titles.items()}
+    (tmp_path / "a.json").write_text(json.dumps(tests))
+    first = import_files([tmp_path]).records[0]
+    assert first.id == "a_I_=_0.5_A_f_=_2.5_Hz"
+    assert ["states 2.5 Hz and the record has" in f.text for f in first.findings if f.code == "W_NAME"] == [True]
+
+
 @pytest.mark.parametrize("stated", [10, 20])
 def test_half_the_length_of_a_name_is_reported_where_the_other_names_state_amplitudes(tmp_path, stated):
     head = "Time (s),Displacement (mm),Force (N)\n"

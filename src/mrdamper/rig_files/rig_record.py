@@ -312,7 +312,8 @@ def _run_id(table: RawTable, path: Path) -> str:
     stem = path.name
     while Path(stem).suffix.lower() in suffixes():
         stem = Path(stem).stem
-    label = "" if not table.label or table.label.startswith("block") else f"_{table.label}"
+    label = re.sub("(?<=[0-9]),(?=[0-9])", ".", table.label)  # 0,5 Hz
+    label = "" if not label or label.startswith("block") else f"_{label}"
     return re.sub(r"[^\w.+=-]+", "_", stem + label).lstrip("_=+-.").rstrip("_.")[:100] or "run"
 
 
