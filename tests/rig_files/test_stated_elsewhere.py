@@ -265,6 +265,23 @@ def test_rows_in_another_order_than_the_tests_are_refused_where_their_peak_force
         assert "another order" in str(found.refusals[0].error)
 
 
+@pytest.mark.parametrize(
+    ("head", "shown"),
+    [
+        ("Fuse: 10 A", "'Fuse: 10 A' (of a limit, a supply or another device)"),
+        ("monitor: 1 A per V", "'monitor: 1 A per V' (a scale)"),
+        ("Tests at 0.5 A and 1 A", "'Tests at 0.5 A and 1 A' (one of several)"),
+        ("", "column 'I_set [A]' (a command, or one of several)"),
+    ],
+)
+def test_currents_that_are_not_taken_are_named_where_one_is_missing(tmp_path, head, shown):
+    columns = (T, X, force(0.5)) if head else (T, X, force(0.5), T)
+    names = "Time [s],Displacement [mm],Force [N]" + ",I_set [A]" * (not head)
+    table(tmp_path / "a.csv", [head, names], *columns)
+    (refusal,) = import_files([tmp_path]).refusals
+    assert refusal.error.found.endswith(f"; not taken for it: {shown}")
+
+
 def test_two_currents_are_named_where_either_may_be_that_of_the_coil(tmp_path):
     names = "Time [s],Displacement [mm],Force [N],Coil 1 current [A],Coil 2 current [A]"
     table(tmp_path / "a.csv", [names], T, X, force(0.5), 0.5 + 0 * T, 0.3 + 0 * T)

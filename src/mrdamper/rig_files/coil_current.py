@@ -13,7 +13,7 @@ import numpy as np
 from mrdamper.data import Floats, held_current
 from mrdamper.data.arrays import chunks
 from mrdamper.data.wording import number
-from mrdamper.errors import ColumnError, InputError, printable
+from mrdamper.errors import ColumnError, InputError, listed, printable
 from mrdamper.rig_files import conditions
 from mrdamper.rig_files.column_names import COIL, RATING, holds, names_condition, split_name
 from mrdamper.rig_files.columns import coil_currents
@@ -24,6 +24,7 @@ from mrdamper.rig_files.record import Finding, Record
 
 _FEWEST_SLOW = 5  # samples of a current that is recorded more rarely than the force
 NO_CHANNEL = "the current channel is "  # beginning of the finding on a column of no current
+_NOT_TAKEN = "not taken for it: "  # beginning of the finding on other currents
 CURRENT_TOO = "and give the current of each test"  # within the remedy of a refusal of units or columns
 _CALIBRATION = 'give its calibration, [channels.current] unit = "A" and scale (A per its unit), in a profile'
 _PROFILE = "profile"  # where a current stands
@@ -154,14 +155,25 @@ def require_current(record: Record, path: Path = Path()) -> Record:
         reasons = [f"{match[0]!r} in its name can be read as {match[2]} A or as {match[1]}.{match[2]} A"]
         stars = ("*", "*") if match.string in places[:2] else ("*/*", "*/*")
         value = f'"{stars[0]}[0-9]{match[0][1:]}{stars[1]}" = {match[2]}'
+    near = [f.text for f in record.findings if f.text.startswith(_NOT_TAKEN)]
     raise ColumnError(
-        (reasons or ["no coil current in a column, or in the name of the file or of its folder"])[0],
+        "; ".join(reasons[:1] or ["no coil current in a column, or in the name of the file or of its folder", *near]),
         where=Path(record.provenance.get("file", record.id)).name,
         remedy=f"{first}write the currents into tests.csv (--write-tests), or set one in a profile: either "
         f'[channels.current] column = "...", or [current] pattern = "*_{{current}}A_*" and unit = "A", or [current] '
         f"values = {{{value}}}, or, if all tests have one, [current] value = 0.5",
         code="E_CURRENT_MISSING",
     )
+
+
+def not_taken(table: RawTable) -> tuple[Finding, ...]:
+    """Tell which columns and lines hold a current, where none of them is taken for that of the test, and why."""
+    columns = [name for name, header in zip(table.names, table.headers, strict=True) if header.dimension == "current"]
+    other = "of a limit, a supply or another device"
+    near = [f"column {n!r} ({other if RATING.search(n) else 'a command, or one of several'})" for n in columns]
+    whys = {line.strip()[:60]: conditions.why_not_taken(line) for line in table.lines}
+    near += [f"{line!r} ({why})" for line, why in whys.items() if why]
+    return (Finding("W_COLUMN", printable(f"{_NOT_TAKEN}{listed(near, 2)}")),) if near else ()
 
 
 def ask_current_too(error: InputError, table: RawTable, profile: Profile, path: Path) -> None:
@@ -230,7 +242,7 @@ def with_stated_current(record: Record, current: float, whence: str, where: str,
         raise _two_statements(record, mean, current, whence, where)
     if record.current is not None and not own:
         return record
-    findings = tuple(finding for finding in record.findings if not finding.text.startswith(NO_CHANNEL))
+    findings = tuple(f for f in record.findings if not f.text.startswith((NO_CHANNEL, _NOT_TAKEN)))
     findings += (Finding("W_CHOSEN", printable(note)),) if note else ()
     provenance = {**record.provenance, "current_from": as_data(whence)}
     doubt = None if own else record.doubt  # of two statements, one of the user's table among them, this one agrees

@@ -282,6 +282,15 @@ def stated_in_titles(lines: Iterable[str]) -> list[Statement]:
     return statements if len({statement.amperes for statement in statements}) == 1 else []
 
 
+def why_not_taken(text: str) -> str:
+    """Tell why a current that a text holds is not taken for that of the test; empty if the text holds none."""
+    if not _IN_NAME.search(_in_ascii(text[:255])):
+        return ""
+    if column_names.RATING.search(text) or _LABELLED_RATING.search(text):
+        return "of a limit, a supply or another device"
+    return "a scale" if _SCALE.search(text) else "explains names" if EXPLAINED.search(text) else "one of several"
+
+
 def series_in(line: str) -> tuple[float, ...]:
     """Return the different currents [A] that a line lists if it says nothing else: currents of tests: 0, 0.5, 1 A."""
     series = None if column_names.RATING.search(line) or _SCALE.search(line) else _SERIES.search(line[:LONGEST_LINE])

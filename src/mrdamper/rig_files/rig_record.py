@@ -111,7 +111,8 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
             part["current"] = coil_current.constant(current, part["time"])
             noticed = [f for f in findings if not f.text.startswith(coil_current.NO_CHANNEL)]
         run = _run_id(table, path) + (f"_{number}" if len(stretches) > 1 else "")
-        noticed = [*noticed, *coil_current.current_by_resistance(table, run)] if "current" not in part else noticed
+        if "current" not in part:
+            noticed = [*noticed, *coil_current.current_by_resistance(table, run), *coil_current.not_taken(table)]
         records.append(
             Record(
                 id=run,
