@@ -591,6 +591,34 @@ def test_units_and_current_of_a_json_file_of_the_same_name(tmp_path):
     require_the_tests(tmp_path)
 
 
+def test_the_frequency_in_a_description_of_a_folder_is_not_that_of_every_record(tmp_path):
+    write(tmp_path, "time_s,hub,force_N\n")
+    says = {"frequency": {"value": 5, "unit": "Hz"}, "hub": {"unit": "mm"}, "force_N": {"unit": "N"}}
+    for name, amperes in CURRENTS.items():
+        (tmp_path / f"{name}.csv").rename(tmp_path / f"{name}_{amperes}A.csv")
+    (tmp_path / "meta.json").write_text(json.dumps(says))
+    require_the_tests(tmp_path)
+    assert not any("motion_stated" in record.provenance for record in import_files([tmp_path]).records)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "2020/03/04, 25, 60\n2020/03/05, 26, 61\n備註\n",
+        "1. Прогрев 10 мин\n2. Запись 30 с\n3. Пауза\n",
+        '試 "A, 3, 4\n3, 4\n',
+    ],
+    ids=["days", "numbered steps", "an open quote"],
+)
+def test_a_note_in_any_script_is_no_refused_test(tmp_path, text):
+    write(tmp_path, UNITS)
+    for name, amperes in CURRENTS.items():
+        (tmp_path / f"{name}.csv").rename(tmp_path / f"{name}_{amperes}A.csv")
+    (tmp_path / "說明.txt").write_text(text)
+    require_the_tests(tmp_path)
+    assert import_files([tmp_path]).left_out == ("說明.txt",)
+
+
 def test_units_and_currents_of_a_yaml_file_for_all_files(tmp_path):
     write(tmp_path, "time,stroke,load\n")
     runs = "".join(f"  - file: {name}.csv\n    current: {amperes}\n" for name, amperes in CURRENTS.items())

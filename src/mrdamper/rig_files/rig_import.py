@@ -45,7 +45,8 @@ _Tests = list[tuple[Path, Record]]
 _SomeTests = Sequence[tuple[Path, Record]]
 _LARGEST_LIST = 2**16  # bytes of a plan of tests that states the current of none that was read
 _MAY_BE_PARTS = (
-    "E_COLUMN", "E_UNITS_MISSING", "E_UNITS_DIMENSION", "E_AMBIGUOUS", "E_NO_DATA", "E_NUMBER", "E_FIELD_COUNT"
+    "E_COLUMN", "E_UNITS_MISSING", "E_UNITS_DIMENSION", "E_AMBIGUOUS", "E_NO_DATA", "E_NUMBER", "E_FIELD_COUNT",
+    "E_TRUNCATED", "E_QUOTE",
 )  # fmt: skip
 
 

@@ -185,7 +185,7 @@ def is_helper(path: Path, files: Collection[Path]) -> bool:
     others = [other for other in files if other != path]
     lines = short_lines(path) if path.suffix.lower() in SHORT_TEXTS else []
     alike = re.sub("[0-9]+", "0", path.stem) in {re.sub("[0-9]+", "0", other.stem) for other in others}
-    if not others or alike or not 0 < len(lines) < _FEWEST_ROWS or not re.search(r"[^\W\d_]", lines[0]):
+    if not others or alike or not 0 < len(lines) < _FEWEST_ROWS or not re.search(r"[^\W\d_]", "".join(lines)):
         return False
     cells = [[cell.strip() for cell in re.split(r"[,;\t|]", line)] for line in lines]
     roles = [{item_of(cell).role for cell in of if not is_unit(cell)} for of in cells]

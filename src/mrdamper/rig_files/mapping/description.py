@@ -23,7 +23,7 @@ from mrdamper.errors import InputError
 from mrdamper.rig_files import column_names
 from mrdamper.rig_files.column_names import UNIT_KEYS, is_unit, names_condition, sentences, split_name, words, words_of
 from mrdamper.rig_files.columns import units_in
-from mrdamper.rig_files.conditions import OTHER_DEVICE, stated_by_lines
+from mrdamper.rig_files.conditions import OTHER_DEVICE, stated_by_lines, stated_motion, stated_quantities
 from mrdamper.rig_files.mapping import scales
 from mrdamper.rig_files.mapping.completion import NUMBERED, item_of, said_of_file, states_si, states_volts
 from mrdamper.rig_files.mapping.result_tables import numbered_tests, with_small_units
@@ -156,7 +156,8 @@ def _of_channels(line: str) -> str:
         return f"channel {cells[1]}: {cells[0]}"  # a tag with its index, and its type
     units = [item_of(cell).unit or cell.rpartition(":")[2].strip() for cell in cells]
     stated = scales.scales_in(line) or scales.states_shift(line) or states_si(line) or states_volts(line)
-    return line if stated or (any(map(is_unit, units)) and not stated_by_lines([line], ".")) else ""
+    of_tests = stated_by_lines([line], ".") or stated_motion(stated_quantities([line]))
+    return line if stated or (any(map(is_unit, units)) and not of_tests) else ""
 
 
 def with_description(table: RawTable, path: Path, profile: Profile) -> RawTable:

@@ -175,14 +175,15 @@ def first_row(content: Sequence[tuple[int, str]], above: int, separator: str, so
         raise NoTableError("E_NO_DATA", "text with numbers in it, but no rows of numbers", file=source.name)
     few = not rows or (len(rows) == 1 and len(content) > 1 and not is_row(sample[-1]))
     named = few and any(names_columns(line, mark) for _, line in content[-SAMPLE:] for mark in SEPARATORS[:-1])
-    if not rows or named:
+    width = Counter(map(len, rows)).most_common(1)[0][0] if rows else 0
+    labelled = 2 * sum(not cells[0] or _is_key(cells[0].strip('"')) for cells in rows) > len(rows)  # or notes beside
+    row = None if named or not rows else _first_of(content, width, separator, labelled=labelled)
+    if row is None:
         what = "names of columns, but no row of numbers below them" if named else "no row of numbers"
         kind = RigFileError if named else NoTableError
         aside = f", or, if it is no test, set [file] leave_out = [{source.name!r}] in a profile" if named else ""
         raise kind("E_NO_DATA", what, file=source.name, remedy=f"export the file again, with its data{aside}")
-    width = Counter(len(cells) for cells in rows).most_common(1)[0][0]
-    labelled = 2 * sum(not cells[0] or _is_key(cells[0].strip('"')) for cells in rows) > len(rows)  # or notes beside
-    first, cells = _first_of(content, width, separator, labelled=labelled)
+    first, cells = row
     trailing = width > 1 and separator != SPACES and not cells[-1] and not any(r[-1] for r in rows if len(r) == width)
     if trailing:
         over = (cells_of(line, separator) for i, line in (*before, *content) if i < first)
@@ -195,10 +196,11 @@ def first_row(content: Sequence[tuple[int, str]], above: int, separator: str, so
 
 def _first_of(
     content: Sequence[tuple[int, str]], width: int, separator: str, *, labelled: bool
-) -> tuple[int, list[str]]:
-    """Index and cells of the first row; a key with numbers behind it is none, unless the rows are labelled.
+) -> tuple[int, list[str]] | None:
+    """Index and cells of the first row; None if there is none.
 
-    A key of its own is none above rows of one label, nor is one of scales: Scale,1,1,1; Data,0.0,1.2,3.4.
+    A key with numbers behind it is none, unless the rows are labelled. A key of its own is none above rows of one
+    label, nor is one of scales: Scale,1,1,1; Data,0.0,1.2,3.4.
     """
     worded: tuple[int, list[str]] | None = None
     first: tuple[int, list[str]] | None = None
@@ -215,9 +217,7 @@ def _first_of(
             alike = not label and width > TELLING and len({*filter(None, cells[1:])}) == 1  # Time, 10:31:22, 10:31:22
             alone = keys[key := cells[0].strip('"').casefold()] == 1 and (_is_key(label) or holds(key, _SCALES))
             first = None if alike else first or (None if alone else (i, cells))
-    row = first or worded
-    assert row is not None
-    return row
+    return first or worded
 
 
 def _is_key(cell: str) -> bool:
