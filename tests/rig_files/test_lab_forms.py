@@ -385,6 +385,18 @@ def test_parts_of_a_record_without_the_heading_of_the_first_go_on_by_their_clock
     assert [refusal.error.code for refusal in result.refusals] == ["E_UNITS_MISSING"] * (2 if gap else 0)
 
 
+@pytest.mark.parametrize("damaged", [2, 3])
+def test_parts_before_one_that_cannot_be_used_are_no_test(tmp_path, damaged):
+    for part, inside in enumerate((slice(0, 300), slice(300, 600), slice(600, None)), 1):
+        table = rows(T[inside], X[inside], force(0.5)[inside])
+        table = table[:-1] + "x\n" if part == damaged else table
+        (tmp_path / f"a_0.5A_part{part}.csv").write_text("Time (s),Displacement (mm),Force (N)\n" + table)
+    refused = {refusal.file[-9:]: refusal.error for refusal in import_files([tmp_path]).refusals}
+    assert [*refused] == [f"part{part}.csv" for part in range(1, damaged + 1)]
+    before = [error.found for error in refused.values()][:-1]
+    assert all(f"goes on in a_0.5A_part{damaged}.csv, which cannot be used" in found for found in before)
+
+
 def test_the_rest_that_a_column_of_tests_numbers_zero_is_omitted_beside_them(tmp_path):
     text, noise = (
         "time (s),test_id,disp (mm),force (N),current (A)\n",
@@ -1354,6 +1366,15 @@ def test_a_remark_beside_no_column_of_currents_discards_a_test_too(tmp_path, nam
     assert by_id(result) == {"run_1": 0.25, "run_3": 0.75}
 
 
+def test_one_remedy_leaves_out_every_test_that_a_plan_discards(tmp_path):
+    write_tests(tmp_path, (0.25, 0.5, 0.75))
+    (tmp_path / "plan.csv").write_text("Run,Current [A],Remark\n1,0.25,void\n2,0.5,\n3,0.75,aborted\n")
+    remedies = {refusal.error.remedy for refusal in import_files([tmp_path]).refusals}
+    assert [remedy.split(" in a profile")[0] for remedy in remedies] == [
+        'set [file] leave_out = ["run_1.csv", "run_3.csv"]'
+    ]
+
+
 @pytest.mark.parametrize("plan", ["Run,Current [A],Remark\n{}", "Current [A],Remark\n{}"], ids=["numbered", "in order"])
 @pytest.mark.parametrize("pattern", ["all_2", "block 2"])
 def test_a_test_that_is_left_out_of_a_file_leaves_the_others_their_numbers(tmp_path, plan, pattern):
@@ -1382,7 +1403,7 @@ def test_files_and_tests_of_one_name_are_left_out_with_their_folder(tmp_path):
     (tmp_path / "plan.csv").write_text(f"Day,Run,Current [A],Remark\n{lines}")
     (tmp_path / "tue" / "run_1.csv").write_text(HEAD + rows(T, X, force(0.11, 7)))
     refused = [refusal for refusal in import_files([tmp_path]).refusals if refusal.error.code == "E_DISCARDED"]
-    assert ["tue/run_2.csv" in refusal.error.remedy for refusal in refused] == [True]
+    assert ['leave_out = ["tue/run_2.csv"]' in refusal.error.remedy for refusal in refused] == [True]
     left = import_files([tmp_path], parse_profile('[file]\nleave_out = ["tue/run_2.csv"]')).left_out
     assert left.count("run_2.csv") == 1
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import math
 import os
 import re
 import shutil
@@ -136,6 +137,18 @@ def headings_of(path: str | Path, profile: Profile) -> dict[int, Heading]:
         return {table.number(i): of for i, of in enumerate(zip(table.names, table.headers, strict=True))}
 
     return ask_tables(path, both, {}, profile.file)
+
+
+def start_of(path: Path, profile: Profile) -> float:
+    """Return the first time [s] of a file, which may be damaged elsewhere; NaN where none can be read."""
+
+    def first(tables: list[RawTable]) -> float:
+        table = test_tables(tables, profile)[0]
+        clock = partly_assigned(table, profile).get("time")
+        values = table.try_read(clock.column) if clock else None
+        return clock.factor * float(values[clock.column][0]) if clock and values else math.nan
+
+    return ask_tables(path, first, math.nan, profile.file)
 
 
 def tables_of_tests(tables: list[RawTable], profile: Profile) -> tuple[list[RawTable], list[InputError]]:

@@ -6,6 +6,7 @@ Nothing is filled in or moved: missing samples stay NaN here and are left out of
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
@@ -105,6 +106,14 @@ def unique_names(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
         used.add(new)
         own.append(new)
     return own
+
+
+def last_parts(paths: Iterable[tuple[str, ...]]) -> dict[tuple[str, ...], str]:
+    """Return the name of each path, with as many of its folders as tell it from the others."""
+    paths = {*paths}
+    endings = Counter(path[-n:] for path in paths for n in range(1, len(path) + 1))
+    alone = {path: [path[-n:] for n in range(1, len(path) + 1) if endings[path[-n:]] == 1] for path in paths}
+    return {path: "/".join(own[0] if own else path) for path, own in alone.items()}
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from mrdamper.data.progress import Progress, silent
 from mrdamper.data.temporary import without_temporary_folder
 from mrdamper.errors import ColumnError, CombinedError, InputError, is_a, shown, validate_arguments
 from mrdamper.rig_files import coil_current
-from mrdamper.rig_files.file_records import files_in, headings_of, records_of_file, unpacked
+from mrdamper.rig_files.file_records import files_in, headings_of, records_of_file, start_of, unpacked
 from mrdamper.rig_files.mapping import plans
 from mrdamper.rig_files.mapping.companions import holds_channels, is_helper, is_list, joined_files, number_of, part_of
 from mrdamper.rig_files.mapping.comparisons import contradictions, in_another_unit, repeated, stated_as_amplitudes
@@ -33,8 +33,8 @@ from mrdamper.rig_files.quality import check_long_record
 from mrdamper.rig_files.quality.table import to_run
 from mrdamper.rig_files.readers import suffixes
 from mrdamper.rig_files.readers.base import NoTableError, RigFileError
-from mrdamper.rig_files.record import Finding, Record, Refusal, unique_names
-from mrdamper.rig_files.sequences import follows, goes_on, is_next, tests_of_files
+from mrdamper.rig_files.record import Finding, Record, Refusal, last_parts, unique_names
+from mrdamper.rig_files.sequences import clock_goes_on, follows, goes_on, is_next, tests_of_files
 from mrdamper.rig_files.tests_table import NAME as TESTS
 from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests, names_tests
 
@@ -206,6 +206,8 @@ class _Intake:
         records, refusals = _unchecked(path, profile)
         if refusals and self._parts and is_next(self._parts[-1][0], path):
             records, refusals = self._without_heading(path, profile) or (records, refusals)
+            if refusals and clock_goes_on(self._parts[-1][1][-1], start_of(path, profile)):
+                self._refuse_parts(path, refusals[0].error)
         self.met += [] if records else [(path, "")]
         no_table = not records and not given and [type(refusal.error) for refusal in refusals] == [NoTableError]
         no_table |= not records and not given and is_readme(path) and not holds_channels(path, profile.file)
@@ -217,6 +219,15 @@ class _Intake:
         self._parts.append((path, records))
         if whole:
             self._take_parts()
+
+    def _refuse_parts(self, path: Path, error: InputError) -> None:
+        """Refuse the parts of a record that goes on in a file which cannot be used: they are no whole test."""
+        problem = f"goes on in {path.name}, which cannot be used: {error.found}"
+        parts = [part for part, _ in self._parts]
+        torn = {part: RigFileError(error.code, problem, file=part.name, remedy=error.remedy) for part in parts}
+        self.refusals += [Refusal(str(part), why) for part, why in torn.items()]
+        self.met += [(part, "") for part in parts]
+        self._parts = []
 
     def _without_heading(self, path: Path, profile: Profile) -> tuple[list[Record], list[Refusal]] | None:
         """Return the tests of a part of a record of which the first names the columns; None if it does not go on."""
@@ -556,14 +567,10 @@ def found_tests(
 
 def _with_folders(tests: Sequence[tuple[Path, Record]]) -> list[Record]:
     """Return records whose file is told with its folders, where files of several folders have one name."""
-    paths = {path for path, _ in tests}
-    endings = Counter(path.parts[-depth:] for path in paths for depth in range(1, len(path.parts) + 1))
-    records = []
-    for path, record in tests:
-        depth = next((n for n in range(1, len(path.parts)) if endings[path.parts[-n:]] == 1), len(path.parts))
-        file = coil_current.as_data("/".join(path.parts[-depth:]))
-        records.append(record if depth == 1 else replace(record, provenance={**record.provenance, "file": file}))
-    return records
+    names = last_parts(path.parts for path, _ in tests)
+    files = [coil_current.as_data(names[path.parts]) if names[path.parts] != path.name else "" for path, _ in tests]
+    both = zip(files, (record for _, record in tests), strict=True)
+    return [replace(r, provenance={**r.provenance, "file": file}) if file else r for file, r in both]
 
 
 def to_dataset(records: Sequence[Record], name: str = "dataset") -> Dataset:

@@ -100,6 +100,11 @@ def is_next(last: Path, path: Path) -> bool:
     return bool(old and new and named and int(new["n"]) == int(old["n"]) + 1)
 
 
+def clock_goes_on(record: Record, start: float) -> bool:
+    """Tell if a time [s] is that of the sample after the last of a record."""
+    return 0 < _steps_to(record, start) <= _MOST_STEPS
+
+
 def _continues(one: Record, other: Record) -> bool:
     """Tell if the clock and the motion of a record go on in another, of the same channels."""
     if one.channels.keys() != other.channels.keys() or not 0 < _steps_between(one, other) <= _MOST_STEPS:
@@ -153,10 +158,14 @@ def _concatenated(records: Sequence[Record]) -> Record:
 
 def _steps_between(one: Record, other: Record) -> float:
     """Return the time from the last sample of a record to the first of another, in steps of the first."""
-    time = one.time[np.isfinite(one.time)]
     start = other.time[np.isfinite(other.time)][:1]
+    return _steps_to(one, float(start[0])) if start.size else 0.0
+
+
+def _steps_to(record: Record, start: float) -> float:
+    time = record.time[np.isfinite(record.time)]
     step = float(np.median(np.diff(time))) if time.size > 1 else 0.0
-    return float(start[0] - time[-1]) / step if start.size and step > 0 else 0.0
+    return float(start - time[-1]) / step if step > 0 else 0.0
 
 
 def _gap(one: Record, other: Record) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -22,12 +21,12 @@ from mrdamper.rig_files.mapping.description import SHORT_TEXTS, short_lines, wit
 from mrdamper.rig_files.mapping.name_schemes import Tests, by_example, by_legend, by_scheme, fields_of_names
 from mrdamper.rig_files.mapping.result_tables import lines_of, results_among, results_in
 from mrdamper.rig_files.mapping.results import Results, rows_below_heads
-from mrdamper.rig_files.profile import FileForm, Profile
+from mrdamper.rig_files.profile import FileForm, Profile, toml
 from mrdamper.rig_files.quality.motion import moves
 from mrdamper.rig_files.quality.view import View, strokes_of
 from mrdamper.rig_files.readers import ask_tables, raw_tables
 from mrdamper.rig_files.readers.base import RawTable
-from mrdamper.rig_files.record import HEAD, Finding, Record, part_of_record
+from mrdamper.rig_files.record import HEAD, Finding, Record, last_parts, part_of_record
 
 _DISCARDED, _DISCARDED_FLAG, _NOT_DISCARDED = (
     re.compile("(?i)" + "|".join(words(of))) for of in ("discarded", "discarded_flag", "not_discarded")
@@ -211,18 +210,19 @@ def discarded_tests(path: Path, results: Results | None, tests: Tests) -> dict[i
     remarks = [next(iter(of), "") for of in texts]
     if results is None or results.of_supply or not any(remarks) or all(remarks):  # of all tests it is of none
         return {}
-    refused: dict[int, InputError] = {}
     files = [file for file, _ in tests]
     parts = [file.parts if files.count(file) == 1 else (*file.parts, record.id) for file, record in tests]
-    for i, row in enumerate(rows_beside(path, results, tests)):
-        if remarks[row]:
-            file, own = files[i], parts[i]
-            alone = (n for n in range(1, len(own)) if sum(part[-n:] == own[-n:] for part in parts) == 1)
-            name = json.dumps("/".join(own[-next(alone) :]), ensure_ascii=False)
-            problem = f"{path.name} has the remark {remarks[row][:80]!r} on this test"
-            remedy = f"set [file] leave_out = [{name}] in a profile, or correct the remark if the test is valid"
-            refused[i] = QualityError(printable(problem), where=file.name, remedy=remedy, code="E_DISCARDED")
-    return refused
+    refused = {i: remarks[row] for i, row in enumerate(rows_beside(path, results, tests)) if remarks[row]}
+    names = last_parts(parts)
+    left_out = toml([names[parts[i]] for i in refused])
+    remedy = f"set [file] leave_out = {left_out} in a profile, or correct the remark if a test is valid"
+    problem = "{} has the remark {!r} on this test"
+    return {
+        i: QualityError(
+            printable(problem.format(path.name, text[:80])), where=files[i].name, remedy=remedy, code="E_DISCARDED"
+        )
+        for i, text in refused.items()
+    }
 
 
 def _discards(heading: str, cell: str) -> bool:
