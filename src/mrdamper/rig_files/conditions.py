@@ -10,6 +10,7 @@ import re
 import unicodedata
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from datetime import date
+from functools import lru_cache
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -39,7 +40,7 @@ _LINE = re.compile(
     r"[\s;,\t\"]*[\[(]?(?P<unit>(?:1/)?(?:[^\W\d_]|/){0,11}(?:-1)?)[\])]?[\s;,\t\"]*$"
 )
 CELL = re.compile(r"\s*([+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+))\s*((?:[^\W\d_]|°){0,8})\s*")  # with a unit
-LONGEST_LINE, _MOST_PARTS = 300, 20
+LONGEST_LINE, _LONGEST_NAME, _MOST_PARTS = 300, 255, 20
 _TOLERANCE = re.compile(r"\s*(?:\+\s?/?\s?[-−]|±)\s*[0-9]+(?:[.,][0-9]+)?\s*%?")
 FULL_SCALES = ("100", "1000", "255", "1023", "4095", "16383", "32767", "65535")  # largest numbers of converters
 _OF_SCALE = r"(?:m?[VA]|k?N|[mµ]?m|bar|counts?|bits?)"  # units
@@ -123,7 +124,12 @@ def currents_in(text: str) -> tuple[float, ...]:
     `1200mA`, `1.2 A`, `0p4A`, `0x25A`, `-0.3A-`, `I0.4A`; 0_5A may be five or half an ampere and states
     none, nor does what stands beside a fuse, a supply or a limit.
     """
-    text = _in_ascii(text[:255])
+    return _currents_in(text[:_LONGEST_NAME])
+
+
+@lru_cache(4096)
+def _currents_in(text: str) -> tuple[float, ...]:
+    text = _in_ascii(text)
     text = _OTHER_SCRIPT.sub(lambda match: f" {match.lastgroup}", text)
     if behind_digits(text) or _LABELLED_RATING.search(text):
         return ()

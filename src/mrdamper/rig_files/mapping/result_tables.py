@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from itertools import takewhile
 
 from mrdamper.rig_files import column_names, conditions
@@ -44,11 +45,15 @@ _MEASURED = tuple(words("measured"))
 
 def results_in(lines: Sequence[str]) -> Results | None:
     """Return the table of results among lines of text; None if there is none or several."""
+    return _results_in(tuple(line[:LONGEST_LINE] for line in lines[:MOST_LINES]))
+
+
+@lru_cache(16)  # the same heads and notes stand beside several tests
+def _results_in(lines: tuple[str, ...]) -> Results | None:
     for separator in SEPARATORS:
-        tables = {(table.current, table.cells): table for table in _tables(lines[:MOST_LINES], separator)}
+        tables = {(table.current, table.cells): table for table in _tables(lines, separator)}
         if tables:
             return _with_row_a_test(*tables.values()) if len(tables) == 1 else None
-    lines = lines[:MOST_LINES]
     return numbered_tests(lines) or _log_by_clock(lines) or _matrix_of_tests(lines)
 
 
@@ -179,8 +184,7 @@ def _last_lines(table: RawTable, shared: set[str]) -> list[str]:
 
 def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
     wide = separator == "  "
-    cut = [line[:LONGEST_LINE] for line in lines]
-    split = [re.split(r" {2,}", line.strip()) if wide else cells_of(line, separator) for line in cut]
+    split = [re.split(r" {2,}", line.strip()) if wide else cells_of(line, separator) for line in lines]
     bare = [[c.strip('"').strip() for c in cells] for cells in split if not _RULE.fullmatch("".join(cells))]
     rows = [*map(with_small_units, bare)]
     for at, row in enumerate(rows):
