@@ -23,7 +23,13 @@ from mrdamper.errors import InputError
 from mrdamper.rig_files import column_names
 from mrdamper.rig_files.column_names import UNIT_KEYS, is_unit, names_condition, sentences, split_name, words, words_of
 from mrdamper.rig_files.columns import units_in
-from mrdamper.rig_files.conditions import OTHER_DEVICE, stated_by_lines, stated_motion, stated_quantities
+from mrdamper.rig_files.conditions import (
+    OTHER_DEVICE,
+    stated_by_lines,
+    stated_in_titles,
+    stated_motion,
+    stated_quantities,
+)
 from mrdamper.rig_files.mapping import scales
 from mrdamper.rig_files.mapping.completion import NUMBERED, item_of, said_of_file, states_si, states_volts
 from mrdamper.rig_files.mapping.result_tables import numbered_tests, with_small_units
@@ -91,6 +97,8 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
         units_in,
         partial(said_of_file, name=path.name),
     ]
+    # A current may be that of one test, or an example.
+    lines = [line for line in lines if not (stated_by_lines([line], ".") or stated_in_titles([line]))]
     stated = [(lacking and _of_channels(line)) or line * any(tells(line) for tells in about) for line in lines]
     force = profile.channel("force")
     stated += [f"force [{force.unit}]"] if force.unit and force.column is None else []  # heads columns 0 A, 0.5 A, ...
