@@ -8,6 +8,7 @@ import pytest
 from support.dampers import joint_damper, modified_damper
 
 from mrdamper.dampers.joint import JointFit, LocalMinimum
+from mrdamper.dampers.sessions import GainOffset
 from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import Condition
 from mrdamper.report.limitations import RANGE, _explain, limitations
@@ -163,3 +164,32 @@ def test_tests_at_different_temperatures_are_a_limitation():
     ]
     assert sentences("23.5", "25", "26") == []
     assert sentences("", "cold", "n/a") == []
+
+
+def test_sessions_whose_forces_differ_by_more_than_their_runs_are_a_limitation():
+    fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), StopReason.SETTLED, 0.1)
+    condition, scores = Condition(0.5, 1.0, 0.01), Scores(0.02, *5 * (0.0,))
+
+    def sentences(*sessions, clock=""):
+        """Each session by the gains and offsets [N] of its runs."""
+        read = [(f"day{day}", *one) for day, own in enumerate(sessions, 1) for one in own]
+        runs, tests = [], []
+        for n, (day, gain, offset) in enumerate(read):
+            reading = GainOffset(gain, offset, 0.0, 1.0, 0.0, 2000.0)
+            runs.append(RunScore(f"t{n}", "rig", condition, scores, None, (), reading=reading))
+            tests.append(SimpleNamespace(id=f"t{n}", notes={"recorded_at": clock} if clock else {"session": day}))
+        train = replace(scored(fit), train=Validation("train", tuple(runs)))
+        return [text for text in texts_of(limitations(train, (), tests)) if text.startswith("Sessions")]
+
+    alike = [(1.00, 4.0), (1.01, -3.0), (0.99, 2.0), (1.0, 0.0)]
+    gains, offsets = [(of + 0.1, n) for of, n in alike], [(of, n + 150.0) for of, n in alike]
+    assert sentences(alike, alike, alike) == sentences(alike) == sentences(alike[:1], gains[:1]) == []
+    assert sentences(alike, gains, clock="noon") == []
+    (gain,) = sentences(alike, gains, alike)
+    assert gain.startswith("Sessions differ in the gain of measured over predicted force: 1 in day1, 1.1 in day2, 1 in")
+    (offset,) = sentences(alike, offsets)
+    assert "0.75 N in day1, 151 N in day2;" in offset
+    (extremes,) = sentences(alike, alike, gains, alike, [(of - 0.1, n) for of, n in alike])
+    assert "0.9 in day5, 1.1 in day3;" in extremes
+    scattered = [(0.9, 0.0), (1.1, 0.0), (1.0, 0.0)]
+    assert sentences(scattered, [(of + 0.05, n) for of, n in scattered]) == []

@@ -6,6 +6,7 @@ import re
 from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
+from scipy.special import fdtrc
 
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.coil import Coil
@@ -13,9 +14,9 @@ from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.dampers.prediction import NOT_A_SINE
 from mrdamper.dampers.uncertainty import Uncertainty, uncertainty_warnings
-from mrdamper.data import Floats, Run
+from mrdamper.data import Floats, Run, session_of
 from mrdamper.data.wording import counted, number
-from mrdamper.errors import listed
+from mrdamper.errors import InputError, listed
 from mrdamper.identification import Identification
 from mrdamper.identification.loop_analysis import LoopAnalysis
 from mrdamper.study.contradictions import MIN_RUNS
@@ -34,6 +35,11 @@ _MIN_CYCLES = 1.95  # cycles of a record from which its repeatability is determi
 _MAX_RUNS = 4  # number of runs named in one sentence
 _SAME_CURRENT_A = 0.01  # difference of currents that are one level [A]
 _SAME_TEMPERATURE_K = 5.0  # difference of temperatures that are one [K]
+_SAME_GAIN, _SAME_OFFSET = (
+    0.03,
+    0.02,
+)  # differences of the mean of two sessions: of gain, of offset per peak-to-peak force
+_CHANCE = 0.05  # probability of a difference between sessions by chance
 _SAME_MOTION = 0.05  # relative difference of frequencies or amplitudes that are one
 
 
@@ -49,6 +55,7 @@ def limitations(
             *_design(loops, [run.run_id for run in scored.train.runs]),
             *notes,
             *_temperature(runs, {run.run_id for run in scored.train.runs}),
+            *_sessions(runs, scored.train),
             *_prediction(scored.cross_validated, scored.validation),
         ],
         PARAMETERS: [
@@ -132,6 +139,36 @@ def _temperature(runs: Iterable[Run], identified: Collection[str]) -> list[str]:
         f"Tests at {min(values):.0f} to {max(values):.0f} °C: the temperature is no input of the model, "
         "and its effect counts as scatter between runs."
     ]
+
+
+def _sessions(runs: Iterable[Run], train: Validation) -> list[str]:
+    """State gains and offsets of the sessions where these differ by more than runs of one session do (F test)."""
+    readings = {score.run_id: score.reading for score in train.runs if score.reading is not None}
+    try:
+        session = {run.id: session_of(run) for run in runs if run.id in readings}
+    except InputError:  # a clock that is no date tells no session
+        return []
+    names = sorted({*session.values()} - {None})  # type: ignore[type-var]
+    own = [[readings[run_id] for run_id, of in session.items() if of == name] for name in names]
+    more = sum(map(len, own)) - len(own)  # degrees of freedom within sessions
+    sentences = []
+    for what, unit, least in (
+        (("gain", "", _SAME_GAIN), ("offset", " N", _SAME_OFFSET)) if len(own) > 1 and more else ()
+    ):
+        groups = [np.array([getattr(one, what) for one in of]) for of in own]
+        means, weights = np.array([group.mean() for group in groups]), [len(group) for group in groups]
+        within = sum(float(np.sum((group - group.mean()) ** 2)) for group in groups) / more
+        between = float(np.dot(weights, (means - np.average(means, weights=weights)) ** 2)) / (len(groups) - 1)
+        scale = 1.0 if what == "gain" else float(np.median([one.pp for of in own for one in of]))
+        by_chance = fdtrc(len(groups) - 1, more, between / (within or 1e-12))
+        if by_chance < _CHANCE and np.ptp(means) > least * scale:
+            shown = range(len(names)) if len(names) <= _MAX_RUNS else (int(np.argmin(means)), int(np.argmax(means)))
+            sentences.append(
+                f"Sessions differ in the {what} of measured over predicted force: "
+                f"{', '.join(f'{number(means[i], 3)}{unit} in {names[i]}' for i in shown)}; "
+                "check load cell, mounting, coil current and temperature of these sessions."
+            )
+    return sentences
 
 
 def _prediction(cross_validated: Validation, validation: Validation) -> list[str]:
