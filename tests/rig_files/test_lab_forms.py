@@ -334,14 +334,14 @@ def test_channels_in_volts_are_refused_with_the_scale_that_is_missing(tmp_path):
     (tmp_path / "tek_0.5A.csv").write_text(head + rows(T, X / 2, force(0.5) / 200))
     (refusal,) = {str(r.error) for r in import_files([tmp_path]).refusals if "force" in str(r.error)}
     assert "CH1, CH2 in volts or counts without a scale" in refusal
-    assert "unit and scale" in refusal
+    assert "unit and scale (unit per V of its column)" in refusal
 
 
 def test_a_channel_in_counts_is_asked_for_with_all_that_it_needs_at_once(tmp_path):
     (tmp_path / "a_0.5A.csv").write_text("t_ms,encoder_counts,force_N\n" + rows(1000 * T, np.round(40 * X), force(0.5)))
     (refusal,) = import_files([tmp_path]).refusals
     assert "encoder_counts in volts or counts without a scale" in str(refusal.error)
-    assert 'set [channels.displacement] column = "...", unit and scale (unit per volt or count)' in str(refusal.error)
+    assert 'set [channels.displacement] column = "...", unit and scale (unit per counts of its column)' in str(refusal.error)
     answer = '[channels.displacement]\ncolumn = "encoder_counts"\nunit = "mm"\nscale = 0.025'
     assert currents(import_files([tmp_path], parse_profile(answer)).records) == [0.5]
 
@@ -809,6 +809,18 @@ def test_a_text_that_a_profile_leaves_out_states_nothing(tmp_path):
     assert currents(import_files([tmp_path]).records) == [0.9]
     profile = parse_profile('[file]\nleave_out = ["wrong*"]\n[current]\nvalue = 0.5')
     assert currents(import_files([tmp_path], profile).records) == [0.5]
+
+
+def test_a_column_that_a_profile_leaves_out_is_not_read(tmp_path):
+    """A current channel that was not connected: the remedy of the refusal names the way, and it works."""
+    head = "time [s],stroke [mm],coil current [A],load [N]\n"
+    (tmp_path / "a_0.5A.csv").write_text(head + rows(T, X, 0 * T + 0.012, force(0.5)))
+    (refusal,) = import_files([tmp_path]).refusals
+    assert '[file] leave_out = ["its name"]' in str(refusal.error)
+    (record,) = import_files([tmp_path], parse_profile('[file]\nleave_out = ["coil current*"]')).records
+    assert currents([record]) == [0.5]
+    np.testing.assert_allclose(record.force, force(0.5), atol=0.01)
+    assert "load [N]" in record.provenance["columns"]
 
 
 def test_sentences_between_commas_are_no_heading(tmp_path):

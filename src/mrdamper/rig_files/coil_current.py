@@ -30,7 +30,8 @@ _CALIBRATION = 'give its calibration, [channels.current] unit = "A" and scale (A
 _PROFILE = "profile"  # where a current stands
 _DECIDE = "write the right one into tests.csv (--write-tests), or correct the one that is wrong"
 _CHANNEL_WRONG = (
-    'if the channel is wrong, set [channels.current] unit = "A" and scale in a profile, or leave its column out'
+    'if the channel is wrong, set [channels.current] unit = "A" and scale in a profile, or leave its column out there: '
+    '[file] leave_out = ["its name"]'
 )
 _OF_ANOTHER = re.compile("(?i)shunt|bridge|brücke")  # resistance or voltage
 _LARGEST_MARKED, _MOST_MARKS = 64 * 2**20, 500  # bytes of a file in whose rows marks are looked for, and marks

@@ -298,7 +298,8 @@ def _missing(table: RawTable, columns: Mapping[str, int], profile: Profile) -> l
     signals = [i for i, h in enumerate(table.headers) if h.dimension == "voltage" or holds(h.unit, _COUNTS)]
     if signals:  # a column alone would not do
         shown += f"; {', '.join(table.names[i] for i in signals)} in volts or counts without a scale"
-        fixed |= dict.fromkeys(SIGNED, ", unit and scale (unit per volt or count)")
+        per = " or ".join(dict.fromkeys(table.headers[i].unit or "count" for i in signals))
+        fixed |= dict.fromkeys(SIGNED, f", unit and scale (unit per {per} of its column)")
     if (len(table.names) == 2 and len(missing) > 1) or {*columns} & {*SIGNED, "current"}:  # several files
         each = ', and file = "...{run}..." where each file has one channel,'
         fixed |= {role: fixed.get(role, "") + each for role in missing if role != "time"}

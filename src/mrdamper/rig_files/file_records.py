@@ -39,7 +39,7 @@ from mrdamper.rig_files.readers.archive import (
     opened,
     zip_members,
 )
-from mrdamper.rig_files.readers.base import MOST_RATIO, MOST_UNPACKED, RawTable, RigFileError, Source
+from mrdamper.rig_files.readers.base import MOST_RATIO, MOST_UNPACKED, Content, RawTable, RigFileError, Source
 from mrdamper.rig_files.record import REQUIRED, Finding, Record
 from mrdamper.rig_files.rig_record import records_of
 from mrdamper.rig_files.sequences import joined, names_of_blocks
@@ -103,9 +103,22 @@ def records_of_file(path: Path, profile: Profile) -> tuple[list[Record], list[In
 
 
 def described(tables: list[RawTable], path: Path, profile: Profile) -> list[RawTable]:
-    """Return the tables of a file with what the texts beside it state."""
+    """Return the tables of a file with what the texts beside it state, without the columns that a profile leaves out."""
+    tables = [_without_left_out(table, profile) for table in tables]
     own = [with_description(tables[0], path, profile)] if len(tables) == 1 else tables
     return [with_notes(table, path, profile) for table in own]
+
+
+def _without_left_out(table: RawTable, profile: Profile) -> RawTable:
+    kept = [i for i, name in enumerate(table.names) if not (name and profile.leaves_out(name))]
+    if not kept or len(kept) == len(table.names):
+        return table
+
+    def read(columns: Sequence[int]) -> Content:
+        content = table.read([kept[i] for i in columns])
+        return replace(content, values={i: content.values[kept[i]] for i in columns})
+
+    return table.picked(kept, read)
 
 
 def digest_of(path: Path) -> str:

@@ -54,7 +54,7 @@ class FileForm(Table):
     blocks: Literal["join", "split"] | None = None
     """If what looks like several tests (repeated headers, groups of columns, a time that starts again) is one."""
     leave_out: tuple[NAME, ...] = Field(default=(), max_length=100, strict=False)
-    """Patterns with * of files, and tables or tests within them, to leave out: `warmup*`, `*/calibration`, `b_2`."""
+    """Patterns with * of files, and tables, tests or columns within them, to leave out: `warmup*`, `*/calibration`."""
     sample_rate_Hz: float | None = Field(default=None, gt=0, allow_inf_nan=False)
     """Of files without time stamps."""
 

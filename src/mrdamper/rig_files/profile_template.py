@@ -124,6 +124,6 @@ def _alternatives(columns: Mapping[int, str], kinds: Mapping[str, Mapping[int, t
             "", *(lines or ["# Columns of the file, for column = \"...\" or column = NUMBER:", *named(columns)]),
             "# One current for all files ([current] value), or one in their names or folders:",
             '# pattern = "*_{current}A_*" or "*/{current}A/*"; {run}, {frequency}, {amplitude} stand for other numbers',
-            '# Files and tables that are no tests: [file] leave_out = ["warmup*"]', "",
+            '# Files and tables that are no tests, and columns without use: [file] leave_out = ["warmup*"]', "",
         ]
     )  # fmt: skip
