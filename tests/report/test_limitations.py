@@ -136,9 +136,9 @@ def test_what_the_design_of_the_tests_cannot_show_is_stated_first(conditions, sa
     fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), StopReason.SETTLED, 0.1)
     tests = {f"t{k}": Condition(*condition) for k, condition in enumerate(conditions)}
     runs = tuple(RunScore(name, "rig", at, Scores(0.02, *5 * (0.0,)), None, ()) for name, at in tests.items())
+    motion = SimpleNamespace(is_sine=True, drift=0.0, cycles=5.0)
     loops = [
-        SimpleNamespace(run_id=name, condition=at, motion=SimpleNamespace(is_sine=True, drift=0.0, cycles=5.0))
-        for name, at in tests.items()
+        SimpleNamespace(run_id=name, condition=at, motion=motion, dissipated_energy=1.0) for name, at in tests.items()
     ]
     entries = texts_of(limitations(replace(scored(fit), train=Validation("train", runs)), loops))
     design = ("One current", "One motion", "Only")
@@ -193,3 +193,28 @@ def test_sessions_whose_forces_differ_by_more_than_their_runs_are_a_limitation()
     assert "0.9 in day5, 1.1 in day3;" in extremes
     scattered = [(0.9, 0.0), (1.1, 0.0), (1.0, 0.0)]
     assert sentences(scattered, [(of + 0.05, n) for of, n in scattered]) == []
+
+
+@pytest.mark.parametrize(
+    ("energies", "falling"),
+    [
+        ({0.0: 1.0, 0.5: 6.0, 1.0: 3.0, 1.5: 8.0}, "from 0.5 A to 1 A at all 2 motions tested at both, to 50 %"),
+        ({0.0: 1.0, 0.5: 6.0, 1.0: 5.7, 1.5: 8.0}, ""),  # saturated
+        ({0.0: 3.0, 0.5: 1.0}, "from 0 A to 0.5 A"),
+        ({0.0: 3.0, 0.5: 2.0, 1.0: 1.0}, ""),  # a coil that weakens a magnet
+        ({-0.5: 3.0, 0.0: 1.0, 0.5: 3.0}, ""),
+    ],
+)
+def test_a_force_that_falls_between_two_currents_is_a_limitation(energies, falling):
+    fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), StopReason.SETTLED, 0.1)
+    motion = SimpleNamespace(is_sine=True, drift=0.0, cycles=5.0)
+    tests = [(Condition(i, f, 0.01), e * f) for i, e in energies.items() for f in (1.0, 2.0)]
+    loops = [
+        SimpleNamespace(run_id=f"t{n}", condition=condition, motion=motion, dissipated_energy=energy)
+        for n, (condition, energy) in enumerate(tests)
+    ]
+    scores = Scores(0.02, *5 * (0.0,))
+    runs = tuple(RunScore(loop.run_id, "rig", loop.condition, scores, None, ()) for loop in loops)
+    entries = texts_of(limitations(replace(scored(fit), train=Validation("train", runs)), loops))
+    sentences = [text for text in entries if text.startswith("The dissipated energy falls")]
+    assert [falling in text for text in sentences] == [True] * bool(falling)

@@ -341,7 +341,9 @@ def test_a_channel_in_counts_is_asked_for_with_all_that_it_needs_at_once(tmp_pat
     (tmp_path / "a_0.5A.csv").write_text("t_ms,encoder_counts,force_N\n" + rows(1000 * T, np.round(40 * X), force(0.5)))
     (refusal,) = import_files([tmp_path]).refusals
     assert "encoder_counts in volts or counts without a scale" in str(refusal.error)
-    assert 'set [channels.displacement] column = "...", unit and scale (unit per counts of its column)' in str(refusal.error)
+    assert 'set [channels.displacement] column = "...", unit and scale (unit per counts of its column)' in str(
+        refusal.error
+    )
     answer = '[channels.displacement]\ncolumn = "encoder_counts"\nunit = "mm"\nscale = 0.025'
     assert currents(import_files([tmp_path], parse_profile(answer)).records) == [0.5]
 

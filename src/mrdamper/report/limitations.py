@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Sequence
+from itertools import pairwise
 
 import numpy as np
 from scipy.special import fdtrc
@@ -39,6 +40,7 @@ _SAME_GAIN, _SAME_OFFSET = (
     0.03,
     0.02,
 )  # differences of the mean of two sessions: of gain, of offset per peak-to-peak force
+_FALLS = 0.9  # ratio of dissipated energies below which the force falls with the current
 _CHANCE = 0.05  # probability of a difference between sessions by chance
 _SAME_MOTION = 0.05  # relative difference of frequencies or amplitudes that are one
 
@@ -54,6 +56,7 @@ def limitations(
         PREDICTION: [
             *_design(loops, [run.run_id for run in scored.train.runs]),
             *notes,
+            *_falling([loop for loop in loops if loop.run_id in {run.run_id for run in scored.train.runs}]),
             *_temperature(runs, {run.run_id for run in scored.train.runs}),
             *_sessions(runs, scored.train),
             *_prediction(scored.cross_validated, scored.validation),
@@ -128,6 +131,33 @@ def _design(loops: Sequence[LoopAnalysis], identified: Sequence[str]) -> list[st
             "the dependence on frequency and amplitude is not identifiable."
         )
     return sentences
+
+
+def _falling(loops: Sequence[LoopAnalysis]) -> list[str]:
+    """Name neighbouring currents between which the dissipated energy falls at every motion tested at both."""
+    at: dict[float, list[LoopAnalysis]] = {}
+    for loop in sorted(loops, key=lambda loop: loop.condition.current_A):
+        level = next((of for of in at if loop.condition.current_A - of <= _SAME_CURRENT_A), loop.condition.current_A)
+        at.setdefault(level, []).append(loop)
+    ratios = {
+        (one, other): [b.dissipated_energy / a.dissipated_energy for a in at[one] for b in at[other] if _alike(a, b)]
+        for one, other in pairwise(at)
+    }
+    falling = [both for both, own in ratios.items() if len(own) > 1 and max(own) < _FALLS]
+    if min(at, default=0.0) < 0 or (len(ratios) > 1 and len(falling) == len(ratios)):
+        return []  # a coil that weakens a magnet
+    return [
+        f"The dissipated energy falls from {one:.3g} A to {other:.3g} A at all {len(ratios[one, other])} motions "
+        f"tested at both, to {100 * float(np.median(ratios[one, other])):.0f} % in the median: these currents may be "
+        "interchanged; if so, correct current_A in runs.csv."
+        for one, other in falling
+    ]
+
+
+def _alike(one: LoopAnalysis, other: LoopAnalysis) -> bool:
+    """Tell if two runs have the same frequency and amplitude."""
+    motions = [(loop.condition.frequency_Hz, loop.condition.amplitude_m) for loop in (one, other)]
+    return not any(_varied(np.array(values)) for values in zip(*motions, strict=True))
 
 
 def _temperature(runs: Iterable[Run], identified: Collection[str]) -> list[str]:

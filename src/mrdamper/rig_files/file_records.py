@@ -103,7 +103,7 @@ def records_of_file(path: Path, profile: Profile) -> tuple[list[Record], list[In
 
 
 def described(tables: list[RawTable], path: Path, profile: Profile) -> list[RawTable]:
-    """Return the tables of a file with what the texts beside it state, without the columns that a profile leaves out."""
+    """Return the tables of a file with what the texts beside it state, without columns that a profile leaves out."""
     tables = [_without_left_out(table, profile) for table in tables]
     own = [with_description(tables[0], path, profile)] if len(tables) == 1 else tables
     return [with_notes(table, path, profile) for table in own]
