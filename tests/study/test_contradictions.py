@@ -91,6 +91,20 @@ def test_the_command_states_repeated_tests_that_differ(sound, tmp_path):
     assert "W_REPEATS: 4 runs (" in result.stderr
 
 
+def test_both_signs_are_told_from_a_zero_of_the_force_only_where_the_loop_shows_it(sound):
+    """Inverted, the loop of a symmetric damper is the loop with its mean force of the other sign."""
+    half = float(np.median([np.ptp(run.force) / 2 for run in sound]))
+    mean = float(np.mean(sound[4].steady().force))
+    runs = [replace(run, force=run.force - mean + 0.5 * half) for run in sound]
+    (one,) = find_contradictions(changed(runs, 4, force=-runs[4].force, displacement=-runs[4].displacement))
+    assert one.cause == "sign"
+    assert f"or the zero of its force is off by {-half:.0f}"[:-2] in one.explanation
+    assert "sign = -1" in one.remedy
+    assert "if it is the zero" in one.remedy
+    (zero,) = find_contradictions(changed(runs, 4, force=runs[4].force - 0.5 * half))
+    assert zero.cause == "offset"
+
+
 @pytest.mark.parametrize("rig", ["labcontrol", "utfsm"])
 def test_no_run_of_a_bundled_rig_is_accused(bundled_study, rig):
     assert bundled_study.rig(rig).contradictions == ()

@@ -31,6 +31,7 @@ _LOST_MOTION_ODDS = 30.0  # increase, without a unit, for a motion that no other
 EMPTY_CELL_ODDS = 6.0  # decrease for a filled empty cell of the matrix of tests, down to its inverse
 MAX_IRREGULARITY = 0.5  # repeated and missing tests of a matrix that is nearly complete, over its tests
 _EDGE_ODDS = 14.0  # increase of a factor or another current for the only run at the lowest or highest current
+_CLEAR_ODDS = 7.0  # difference from which the data decide between two explanations
 _USUAL_STEP = 3.0  # the same of the time between two samples
 _SAME_STEP = 0.01  # relative difference of times between samples that are one
 
@@ -54,6 +55,7 @@ class Trial:
     value: float  # factor that corrects the force, the displacement or the time; force to add [N]; current [A]
     unit: str  # unit the channel is in, where the factor is that of a unit
     odds: float  # logarithm of the prior odds against it
+    zero: float = 0.0  # force to add [N] that explains the run as well as other signs do
 
     def is_like(self, other: Trial) -> bool:
         """Tell whether two runs have the same cause with the same value."""
@@ -98,9 +100,15 @@ class ExplanationCandidate:
         are any.
         """
         changes = list(self._trials(others, like))
-        least, *odds = others.log_probabilities(others.weigh([self.own, *(products for _, products in changes)]))
+        zero = next(self._of_the_force(others))
+        versions = [self.own, self.changed(zero), *(products for _, products in changes)]
+        least, at_zero, *odds = others.log_probabilities(others.weigh(versions))
         candidates: list[Explanation] = []
         for (trial, products), logarithm in zip(changes, odds, strict=True):
+            if trial.cause == "sign" and at_zero > logarithm - _CLEAR_ODDS:
+                if at_zero > logarithm + _CLEAR_ODDS:
+                    continue  # another zero of the force explains it, of whatever size
+                trial = replace(trial, zero=zero.value)
             if trial.cause in ("force", "current") and self._is_edge:
                 trial = replace(trial, odds=trial.odds + _EDGE_ODDS)
             candidates.append(Explanation(trial, logarithm - trial.odds - least, products))

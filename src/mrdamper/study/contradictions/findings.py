@@ -119,7 +119,12 @@ def _time(run: Run, e: Trial) -> tuple[str, str]:
 
 def _sign(run: Run, e: Trial) -> tuple[str, str]:
     lines = [f"[channels.{name}] sign = {-_sign_read(run, name)}" for name in ("force", "displacement")]
-    return "its force and displacement both count in the other direction", _own_profile(run, " and ".join(lines))
+    text = "its force and displacement both count in the other direction"
+    remedy = _own_profile(run, " and ".join(lines))
+    if not e.zero:
+        return text, remedy
+    text += f", or the zero of its force is off by {number(-e.zero, 3)} N"
+    return text, f"{remedy}; or, if it is the zero, {_shifted_by(run, 'force', e.zero)}"
 
 
 def _damper(run: Run, e: Trial) -> tuple[str, str]:
