@@ -13,14 +13,17 @@ from support.sessions import session_runs
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
+from mrdamper.dampers.calibration import Growth
 from mrdamper.dampers.covariance import estimate_uncertainty
+from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.model_file import save_model
+from mrdamper.dampers.prediction import distance_from_tests
 from mrdamper.data import Condition
 from mrdamper.errors import ConditionError, InputError
 from mrdamper.rig_files.dataset_samples import load_motion
 from mrdamper.study.first_matrix import first_matrix
 from mrdamper.study.limits import Limits
-from mrdamper.study.plan import ExperimentDesign, _slopes, least_informative_runs, plan_tests
+from mrdamper.study.plan import ExperimentDesign, _slopes, _with_currents_between, least_informative_runs, plan_tests
 from mrdamper.study.proposal import PlanRow
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
@@ -159,11 +162,42 @@ def test_a_plan_says_what_its_numbers_are(reckoning, damper):
     t = 164.4853627  # of a normal distribution, in per cent
     whole = [t * np.sqrt(s**2 + reckoning.beside) for s in (before, after)]
     text = reckoning.summary(made)
-    assert f"±{t * before:.1f} -> ±{t * after:.1f} % from the parameters" in text
-    assert f"±{whole[0]:.1f} -> ±{whole[1]:.1f} % with a future session and the model error at tests" in text
+    assert f"±{t * before:.1f} % -> ±{t * after:.1f} % from the parameters and the distance from the tests" in text
+    assert f"±{whole[0]:.1f} % -> ±{whole[1]:.1f} % with a future session and the model error at tests" in text
     own = design(damper, "c1").proposals([[0], [1]])
-    shown = f"standard error of c1 {100 * own[0].before:.1f} -> {100 * own[-1].after:.1f} % of its value"
+    shown = f"standard error of c1 {100 * own[0].before:.1f} % -> {100 * own[-1].after:.1f} % of its value"
     assert design(damper, "c1").summary(own) == shown
+    wild = [replace(own[0], before=519.0), replace(own[-1], after=0.2)]
+    expected = "standard error of c1 over 100 % (not determined) -> 20.0 % of its value"
+    assert design(damper, "c1").summary(wild) == expected
+
+
+def test_a_plan_between_two_currents_tests_one_between_and_reduces_what_the_interval_states(damper):
+    """The model error between two tested currents is no variance of parameters."""
+    tests = [Condition(i, f, a) for i in (0.0, 1.0) for f, a in ((0.5, 0.02), (4.0, 0.002), (0.5, 0.002), (1.0, 0.02))]
+    known = replace(
+        damper, envelope=Envelope.of(tests),
+        uncertainty=replace(damper.uncertainty, growth=Growth(force=(0.15, 0.25, 0.25), dof=(1.0, 1.0, 1.0))),
+    )  # fmt: skip
+    limits = replace(LIMITS, sessions=1)
+    made, reckoning = plan_tests(known, limits, 0.2)
+    currents = [item.condition.current_A for item in made]
+    assert {0.33, 0.67} & set(currents)
+    reasons = [item.reason for item in made if 0 < item.condition.current_A < 1]
+    assert "model error between the tested currents falls to" in reasons[0]
+    # The variances are those of the interval, at the conditions of the grid and at currents between them.
+    at = _with_currents_between(reckoning.conditions)
+    assert {c.current_A for c in at} == {0.0, 0.165, 0.33, 0.5, 0.67, 0.835, 1.0}
+    for rows in ([], [reckoning.conditions.index(item.condition) for item in made]):
+        later = replace(known, envelope=known.envelope.with_tests([reckoning.conditions[i] for i in rows]))
+        halves = [
+            later.uncertainty.growth.half_width("force", distance_from_tests(later, c, np.array([c.current_A])), 0.9)
+            for c in at
+        ]
+        assert reckoning.by_distance(rows).sum() == pytest.approx(np.mean(np.square(halves)) / 1.644853627**2)
+    _, at_one = plan_tests(known, limits, 0.2, Condition(0.5, 1.0, 0.01))
+    assert at_one.by_distance([])[0] > reckoning.by_distance([])[0]
+    assert not plan_tests(known, limits, 0.2, "c1")[1].by_distance([]).any()
 
 
 def small(records, minutes, *, sessions=1, opening=0.0, known=1e-9, session=1e12):

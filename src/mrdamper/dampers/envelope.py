@@ -80,6 +80,16 @@ class Envelope:
         current, frequency, amplitude, velocity = ((min(values), max(values)) for values in zip(*rows, strict=True))
         return cls(current, frequency, amplitude, velocity, conditions=tested)
 
+    def with_tests(self, conditions: Sequence[Condition]) -> Envelope:
+        """Return the envelope with further tested sines at one current each, where its own conditions are known."""
+        if not self.conditions:
+            return self
+        wider = Envelope.of([*self._tested, *conditions])
+        names = ("current_A", "frequency_Hz", "amplitude_m", "peak_velocity_m_s")
+        ends = {n: [*getattr(self, n), *getattr(wider, n)] for n in names}
+        ranges = {name: (min(values), max(values)) for name, values in ends.items()}
+        return replace(self, conditions=wider.conditions, **ranges)
+
     def with_motion(self, current: Floats, displacement: Floats, velocity: Floats, *, sine: bool = False) -> Envelope:
         """Return the envelope widened by the samples of a record that is no sine at one current."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -135,4 +136,9 @@ def _between(damper: DamperLike, condition: Condition, current: Floats) -> float
 
 def _peak(damper: DamperLike, at: Condition) -> float:
     """Half the peak-to-peak force [N] of a sine from rest."""
-    return peak_force(damper.force_along(sine(at, _CYCLES, _SAMPLES), at))
+    return peak_force(damper.force_along(_from_rest(at), at))
+
+
+@lru_cache(maxsize=256)
+def _from_rest(at: Condition) -> Excitation:
+    return sine(at, _CYCLES, _SAMPLES)

@@ -1,19 +1,21 @@
 """Test planning: records within the limits of a rig that reduce the uncertainty of a damper most.
 
 Records are added in sequence, each time the one that reduces the mean variance of the force over the envelope most for
-its rig time. Each session has its own gain and offset, so the tenth record of a session has less information than the
-first of the next; but a session takes set-up time, and the number of sessions is optimised, too.
+its rig time. The variance is that of the prediction interval, by the parameters and by the distance from the tests.
+Each session has its own gain and offset, so the tenth record of a session has less information than the first of the
+next; but a session takes set-up time, and the number of sessions is optimised, too.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import count, takewhile
+from itertools import chain, count, pairwise, takewhile
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.prediction import Prediction
@@ -25,6 +27,7 @@ from mrdamper.errors import InputError, UnknownNameError, numbers, validate_argu
 from mrdamper.identification.intervals import student
 from mrdamper.physics.motion import sine
 from mrdamper.statistics.linear import positive
+from mrdamper.study.distance_variance import DISTANCES, distance_variance
 from mrdamper.study.limits import Limits
 from mrdamper.study.proposal import Proposal
 
@@ -103,7 +106,9 @@ class ExperimentDesign:
     grams: Floats
     session: Floats  # (2,) precision of the gain and the offset of a session not yet begun
     about: str  # the uncertainty to reduce, as text
-    beside: float  # variance of the force in addition to the parameters: unknown session and model error
+    beside: float  # variance of the force in addition: unknown session and model error at tests
+    # (3,) variances to be reduced by each of `DISTANCES`, after some records
+    by_distance: Callable[[Sequence[int]], Floats] = lambda rows: np.zeros(len(DISTANCES))
 
     @classmethod
     def of(
@@ -147,7 +152,9 @@ class ExperimentDesign:
         beside = float(mean @ [uncertainty.total_gain**2, uncertainty.total_offset**2]) + uncertainty.force**2
         words = about if isinstance(about, str) else f"at {about}" if about else "over the envelope"
         precision = np.asarray(np.linalg.inv(positive(covariance)), dtype=float)
-        return cls(limits, conditions, names, precision, goal, grams, session, words, beside)
+        between = [about] if isinstance(about, Condition) else [] if about else _with_currents_between(conditions)
+        by_distance = distance_variance(damper, between, conditions, _LEVEL)
+        return cls(limits, conditions, names, precision, goal, grams, session, words, beside, by_distance)
 
     @cached_property
     def minutes(self) -> Floats:
@@ -162,7 +169,7 @@ class ExperimentDesign:
         return (sums[..., :size, :size] - shared).mean(axis=-3)
 
     def variance(self, precision: Floats) -> Floats:
-        """(...) variance to be reduced."""
+        """(...) variance to be reduced, by the parameters."""
         return np.trace(np.linalg.solve(precision, np.broadcast_to(self.goal, precision.shape)), axis1=-2, axis2=-1)
 
     def precision(self, played: Sessions) -> Floats:
@@ -171,7 +178,12 @@ class ExperimentDesign:
 
     def spread(self, played: Sessions) -> float:
         """Return the standard deviation to be reduced, after some records."""
-        return math.sqrt(self.variance(self.precision(played)))
+        by_distance = self.by_distance([*chain(*played)])
+        return math.sqrt(self.variance(self.precision(played)) + by_distance.sum())
+
+    def _by_distance_with(self, rows: Sequence[int], options: NDArray[np.intp]) -> Floats:
+        """(N,) variance by distance after some records and each option."""
+        return np.array([self.by_distance([*rows, option]).sum() for option in options.tolist()])
 
     def chosen(self, hours: float) -> Sessions:
         """Choose the records, and the number of sessions that reduces the variance most."""
@@ -194,8 +206,10 @@ class ExperimentDesign:
                 return played
             total = self.prior + information.sum(axis=0)
             then = self.information(sums[at] + self.grams[options])
-            gains = (self.variance(total) - self.variance(total - information[at] + then)) / self.minutes[options]
-            best = int(np.argmax(gains))
+            rows = [*chain(*played)]
+            before = self.variance(total) + self.by_distance(rows).sum()
+            after = self.variance(total - information[at] + then) + self._by_distance_with(rows, options)
+            best = int(np.argmax((before - after) / self.minutes[options]))
             played[at].append(int(options[best]))
             sums[at] += self.grams[options[best]]
             information[at], left = then[best], left - self.minutes[options[best]]
@@ -206,22 +220,29 @@ class ExperimentDesign:
             others = self.precision([other for other in played if other is not rows])
             for k, now in enumerate(rows):
                 options = np.flatnonzero(self.minutes <= self.minutes[now])
-                sums = self.grams[rows[:k] + rows[k + 1 :]].sum(axis=0) + self.grams[options]
-                rows[k] = int(options[np.argmin(self.variance(others + self.information(sums)))])
+                left = rows[:k] + rows[k + 1 :]
+                sums = self.grams[left].sum(axis=0) + self.grams[options]
+                remaining = [*left, *chain(*(other for other in played if other is not rows))]
+                after = self.variance(others + self.information(sums)) + self._by_distance_with(remaining, options)
+                rows[k] = int(options[np.argmin(after)])
         return played
 
     def proposals(self, played: Sessions) -> list[Proposal]:
         """Return the records with the standard deviation before and after each, session by session."""
         proposals: list[Proposal] = []
         before, so_far = self.spread([]), [list[int]() for _ in played]
-        today = np.sqrt(np.diag(np.linalg.inv(self.prior)))
+        today, first = np.sqrt(np.diag(np.linalg.inv(self.prior))), self.by_distance([])
+        by_distance = first
         for session, rows in enumerate(played):
             for i in rows:
                 so_far[session].append(i)
-                precision = self.precision(so_far)
-                then = np.sqrt(np.diag(np.linalg.inv(precision))) / today
-                best, after = int(np.argmin(then)), math.sqrt(self.variance(precision))
-                reason = f"standard error of {self.names[best]} falls to {100 * then[best]:.0f} % of today's"
+                after, last, by_distance = self.spread(so_far), by_distance, self.by_distance([*chain(*so_far)])
+                then = np.sqrt(np.diag(np.linalg.inv(self.precision(so_far)))) / today
+                best, nearer = int(np.argmin(then)), int(np.argmax(last - by_distance))
+                what, share = f"standard error of {self.names[best]}", then[best]
+                if (last - by_distance).sum() > (before**2 - after**2) / 2:
+                    what, share = f"model error {DISTANCES[nearer]}", math.sqrt(by_distance[nearer] / first[nearer])
+                reason = f"{what} falls to {100 * share:.0f} % of today's"
                 proposals.append(
                     Proposal(session + 1, self.conditions[i], float(self.minutes[i]), reason, before, after)
                 )
@@ -232,16 +253,28 @@ class ExperimentDesign:
         """State the standard deviation before and after as text."""
         before, after = proposals[0].before, proposals[-1].after
         if self.about in self.names:
-            return f"standard error of {self.about} {100 * before:.1f} -> {100 * after:.1f} % of its value"
-        parameters, total = (
-            [100 * student(_LEVEL, np.inf) * math.sqrt(s**2 + more) for s in (before, after)]
+            return f"standard error of {self.about} {_percent(before)} -> {_percent(after)} of its value"
+        tests, total = (
+            [f"±{_percent(student(_LEVEL, np.inf) * math.hypot(s, math.sqrt(more)))}" for s in (before, after)]
             for more in (0, self.beside)
         )
         return (
             f"{100 * _LEVEL:g} % prediction interval of the force {self.about}, relative to the peak force: "
-            f"±{parameters[0]:.1f} -> ±{parameters[1]:.1f} % from the parameters; "
-            f"±{total[0]:.1f} -> ±{total[1]:.1f} % with a future session and the model error at tests"
+            f"{tests[0]} -> {tests[1]} from the parameters and the distance from the tests; "
+            f"{total[0]} -> {total[1]} with a future session and the model error at tests"
         )
+
+
+def _percent(share: float) -> str:
+    """Write a share as a percentage; over 100 %, the number itself means nothing."""
+    return f"{100 * share:.1f} %" if share <= 1 else "over 100 % (not determined)"
+
+
+def _with_currents_between(conditions: Sequence[Condition]) -> list[Condition]:
+    """Add the currents in the middle between neighbours, at each motion of the first current."""
+    levels = sorted({c.current_A for c in conditions})
+    motions = [c for c in conditions if c.current_A == levels[0]]
+    return [*conditions, *(replace(c, current_A=(a + b) / 2) for a, b in pairwise(levels) for c in motions)]
 
 
 def _slopes(damper: Damper, uncertainty: Uncertainty, names: Sequence[str], condition: Condition) -> Floats:
