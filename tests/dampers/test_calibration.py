@@ -427,6 +427,10 @@ def test_the_scatter_between_sessions_is_that_of_their_means():
     assert gain == pytest.approx(np.sqrt((0.04**2 + 0.06**2 + 0.0) / 3 * 2 / 3))
     assert offset == pytest.approx(10 * gain)
     assert scatter_between_sessions(runs[::-1]) == pytest.approx((gain, offset))
+    # The gain of a session beyond the currents of the others is that of an extrapolation.
+    far = replace(run("r", session="d"), measured=8 * SWING, away=lambda: Distance(beyond=1.2))
+    assert scatter_between_sessions([*runs, far])[0] == pytest.approx(gain * np.sqrt(3 / 2 * 3 / 4))
+    assert scatter_between_sessions([runs[0], far]) is None
 
 
 def test_a_ratio_whose_square_overflows_counts_as_one_without_a_warning():

@@ -192,17 +192,22 @@ def model_error(runs: Sequence[PredictedRun]) -> ModelError:
     return ModelError(float(np.sqrt(np.mean(rests))), root(peaks), root(energies), spread(gains), spread(offsets))
 
 
-def scatter_between_sessions(runs: Sequence[PredictedRun]) -> tuple[float, float]:
+def scatter_between_sessions(runs: Sequence[PredictedRun]) -> tuple[float, float] | None:
     """Estimate the standard deviations of the gain and of the offset [N] between sessions.
 
     The runs were predicted by models identified without their session. The mean of a session, predicted by the mean of
-    the S - 1 others, has an error of S / (S - 1) times the variance.
+    the S - 1 others, has an error of S / (S - 1) times the variance. Runs beyond the currents of the others do not
+    count, because extrapolation changes their gain, too; None if fewer than two sessions remain.
     """
     own: dict[str | None, list[tuple[float, float]]] = {}
     for run in runs:
-        own.setdefault(run.session, []).append((run.reading.gain, run.reading.offset))
+        if not run.distance.beyond:
+            own.setdefault(run.session, []).append((run.reading.gain, run.reading.offset))
+    if len(own) < 2:
+        return None
     means = np.array([np.mean(values, axis=0) for values in own.values()]) - [1.0, 0.0]
-    gain, offset = np.sqrt((1 - 1 / len(means)) * np.mean(means**2, axis=0)).tolist()
+    sessions = len({run.session for run in runs})
+    gain, offset = np.sqrt((1 - 1 / sessions) * np.mean(means**2, axis=0)).tolist()
     return gain, offset
 
 

@@ -348,9 +348,8 @@ def _with_model_error(
     uncertainty = replace(uncertainty, force=error.force, peak=error.peak, energy=error.energy)
     if not cross_validated:
         return uncertainty
-    if other_sessions and uncertainty.of_sessions:
-        gain, offset = scatter_between_sessions(other_sessions)
-        uncertainty = replace(uncertainty, gain=gain, offset=offset)
+    if uncertainty.of_sessions and (scatter := scatter_between_sessions(other_sessions)):
+        uncertainty = replace(uncertainty, gain=scatter[0], offset=scatter[1])
     # A fold with other runs of a session has absorbed part of its gain: the scatter about the mean remains.
     left = 1 - 1 / max(len({part.session for part in parts}), 1)
     of_sessions = {"gain": left * uncertainty.gain**2, "offset": left * uncertainty.offset**2}
