@@ -215,6 +215,16 @@ def test_a_highest_current_of_an_inverse_is_above_zero(highest):
         invert(linear_in_current(600.0, 100.0), highest=highest)
 
 
+def test_an_inverse_beyond_the_tested_currents_is_flagged_as_a_prediction_there():
+    damper = linear_in_current(600.0, 100.0)
+    tested = damper.envelope.current_A[1]
+    inside, beyond = invert(damper), invert(damper, highest=2 * tested)
+    assert inside.extrapolation == ()
+    assert beyond.extrapolation == damper.predict(replace(damper.envelope.middle, current_A=2 * tested)).extrapolation
+    assert "outside the tested range in current" in repr(beyond)
+    assert "outside" not in repr(inside)
+
+
 def test_a_force_that_falls_back_at_high_velocities_only_is_refused_with_its_current():
     """Friction alone rises least at low currents; with a viscous part that falls, the force turns back at high ones."""
     with pytest.raises(ParameterError, match=r"above 0\.8 A"):

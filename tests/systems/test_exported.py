@@ -188,8 +188,13 @@ def test_both_leave_by_the_command_line(tmp_path):
     assert CliRunner().invoke(application(), [*export, "c"]).exit_code == 0
     header = (tmp_path / "inverse/bench_inverse.h").read_text()
     assert "wanted; /* N */" in header
+    header = " ".join(header.replace(" * ", " ").split())
     assert "outside lowest to highest is answered by the nearer of them" in header
+    low, high = joint_damper().envelope.current_A
+    assert f"currents 0 to {high:g} A; tested current {low:g} to {high:g} A, frequency" in header
     export[3] = str(tmp_path / "inverse.fmu")
     assert CliRunner().invoke(application(), [*export, "fmu"]).exit_code == 0
-    assert "wanted" in zipfile.ZipFile(tmp_path / "inverse.fmu").read("modelDescription.xml").decode()
+    description = zipfile.ZipFile(tmp_path / "inverse.fmu").read("modelDescription.xml").decode()
+    assert "wanted" in description
+    assert "; tested current" in description
     assert isinstance(CliRunner().invoke(application(), [*export, "latex"]).exception, InputError)

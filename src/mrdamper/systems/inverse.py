@@ -17,6 +17,7 @@ import numpy as np
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.causal import steps_of
 from mrdamper.dampers.coil import Coil, field_step
+from mrdamper.dampers.envelope import SLACK
 from mrdamper.dampers.streaming import stream
 from mrdamper.data import Floats
 from mrdamper.data.wording import number
@@ -158,7 +159,8 @@ class Inverse:
     """Inverse model of a damper, sample by sample; made by `invert`.
 
     Its program computes current [A], force [N] and the reachable interval [N] from displacement [m], velocity [m/s],
-    acceleration [m/s²], required force [N] and dt [s].
+    acceleration [m/s²], required force [N] and dt [s]. `extrapolation` lists what lies outside the tested ranges, as
+    that of a prediction; `scope` states the range of the currents and those of the tests.
     """
 
     units: ClassVar[Mapping[str, str]] = {
@@ -166,14 +168,14 @@ class Inverse:
         **{"current": "A", "force": "N", "lowest": "N", "highest": "N"},
     }
 
-    def __init__(self, program: Program, title: str):
-        self.program, self.title = program, title
+    def __init__(self, program: Program, title: str, scope: str = "", extrapolation: tuple[str, ...] = ()):
+        self.program, self.title, self.scope, self.extrapolation = program, title, scope, extrapolation
         prepare, self._advance = python_functions(program)
         self._derived = prepare(())[1]
         self.reset()
 
     def __repr__(self) -> str:
-        return f"<{self.title}>"
+        return f"<{self.title}, {self.scope}>"
 
     def reset(self) -> None:
         """Return to the state at rest."""
@@ -216,7 +218,7 @@ def invert(damper: Damper, highest: float | None = None) -> Inverse:
     damper : Damper
         With its coil, if it has one: its lag is compensated.
     highest : float, optional
-        Largest current [A]. Default: the largest tested.
+        Largest current [A]. Default: the largest tested; beyond it, the inverse has "current" in its `extrapolation`.
 
     Raises
     ------
@@ -240,4 +242,9 @@ def invert(damper: Damper, highest: float | None = None) -> Inverse:
     wanted = inputs.pop("wanted")
     most = damper.envelope.current_A[1] if highest is None else highest
     demand = invert_on(tape, damper, "", inputs, wanted, width, most)
-    return Inverse(program(tape, vars(demand)), f"inverse of {damper.title}")
+    scope = f"currents 0 to {number(most, 3)} A"
+    outside = ("current",) if most > damper.envelope.current_A[1] * (1 + SLACK) else ()
+    if damper.envelope.tested:
+        scope += f"; tested {', '.join(f'{name} {span}' for name, span in damper.envelope.ranges(' to ').items())}"
+    scope += "; outside the tested range in current" if outside else ""
+    return Inverse(program(tape, vars(demand)), f"inverse of {damper.title}", scope, outside)

@@ -61,7 +61,9 @@ def _inverse(damper: Damper, name: str, to: str, exporter: Exporter, out: Path) 
     from mrdamper.systems.inverse import invert
 
     turned = invert(damper)
-    title = f"{turned.title}; a wanted force outside lowest to highest is answered by the nearer of them"
+    title = (
+        f"{turned.title}, {turned.scope}; a wanted force outside lowest to highest is answered by the nearer of them"
+    )
     if to == "c":
         return write_program(turned.program, name, title, turned.units, out), ()
     if isinstance(exporter, FMUExporter):
