@@ -42,6 +42,20 @@ def test_a_model_with_a_smaller_error_than_the_chosen_one_has_a_reason(bundled_s
     assert not any("by a standard error" in line for line in study_lines(bundled_study, [], verbose=True))
 
 
+def test_a_model_with_a_much_smaller_validation_error_is_named(bundled_study):
+    rig = bundled_study.rigs[0]
+    chosen, other = rig.chosen, rig.candidates[3]
+    assert not any("validation error" in line for line in study_lines(bundled_study, [], verbose=True))
+    half = 0.5 * chosen.validation.median()
+    runs = [replace(run, scores=replace(run.scores, nrmse_pp=half)) for run in other.validation.runs]
+    better = replace(other, validation=replace(other.validation, runs=tuple(runs)))
+    candidates = tuple(better if one is other else one for one in rig.candidates)
+    lines = study_lines(replace(bundled_study, rigs=(replace(rig, candidates=candidates),)), [])
+    (named,) = [line for line in lines if line.startswith(f"  compared: {other.title}")]
+    errors = f"validation error {100 * half:.2f} % instead of {200 * half:.2f} %"
+    assert named.endswith(f"; {errors}, without effect on the selection: --model {other.recipe.name} takes it")
+
+
 def test_a_model_that_was_asked_for_stands_beside_better_ones_and_its_other_ways(bundled_study):
     rig = bundled_study.rigs[0]
     chosen = next(one for one in rig.candidates if one.recipe.name == "bingham")

@@ -20,6 +20,7 @@ from mrdamper.study.workflow import RigStudy, Study
 LEVEL = 0.9  # coverage of the stated prediction intervals [-]
 _MAX_LINES = 20  # number of lines on a terminal
 _MAX_LIMITATIONS = 5  # number of limitations on a terminal
+_MUCH_SMALLER = 2 / 3  # of the validation error of the selected model
 
 
 @dataclass(frozen=True)
@@ -113,12 +114,15 @@ def _rig_lines(rig: RigStudy, shown: int, *, verbose: bool) -> tuple[list[str], 
         lines.append(f"  {rig.calibration.summary}")
     others = rig.candidates[1:]
     same_model = [c for c in others[1:] if rig.asked_for and c.recipe.model == chosen.recipe.model]
-    for other in others if verbose else [*others[:1], *same_model]:
+    validated = [c for c in others if c not in (*others[:1], *same_model) and _is_validated_better(chosen, c)]
+    best_validated = sorted(validated, key=lambda c: c.validation.median())[:1]
+    for other in others if verbose else [*others[:1], *same_model, *best_validated]:
         is_better = rig.asked_for and other.cross_validated.median() < chosen.cross_validated.median()
-        label = "smaller error" if is_better else "compared" if other in same_model else "next best"
+        is_next = other not in (*same_model, *best_validated)
+        label = "smaller error" if is_better else "next best" if is_next else "compared"
         lines.append(
             f"  {'compared' if verbose else label}: {other.title}, {other.damper.parameter_count} parameters, "
-            f"{_errors('cross-validation', other.cross_validated)}{_why_not(rig, other)}"
+            f"{_errors('cross-validation', other.cross_validated)}{_why_not(rig, other)}{_validated(chosen, other)}"
         )
     if verbose:
         lines += [f"  {row['name']} = {row['written']}" for row in table(rig.damper)]
@@ -144,6 +148,19 @@ def _why_not(rig: RigStudy, other: RecipeResult) -> str:
     if other.damper.parameter_count > chosen.damper.parameter_count:
         return "; in cross-validation over all kinds not better by a standard error"
     return "; in cross-validation over all kinds worse by a standard error"
+
+
+def _is_validated_better(chosen: RecipeResult, other: RecipeResult) -> bool:
+    return other.validation.median() < _MUCH_SMALLER * chosen.validation.median()
+
+
+def _validated(chosen: RecipeResult, other: RecipeResult) -> str:
+    """State a much smaller error of the validation runs, which have no part in the selection."""
+    if not _is_validated_better(chosen, other):
+        return ""
+    smaller, larger = (f"{100 * each.validation.median():.2f} %" for each in (other, chosen))
+    name = other.recipe.name
+    return f"; validation error {smaller} instead of {larger}, without effect on the selection: --model {name} takes it"
 
 
 def _errors(kind: str, scores: Validation) -> str:
