@@ -42,6 +42,15 @@ def test_round_trip_keeps_every_bit(tmp_path):
         assert dict(a.notes) == dict(b.notes)
     np.testing.assert_array_equal(before["b"].velocity, after["b"].velocity)
     assert after["a"].velocity is None
+    assert (after, hash(after)) == (before, hash(before))
+    run = after.runs[0]
+    fast = replace(run, velocity=run.force)
+    assert run != fast != run
+    changed = [replace(run, force=-run.force), replace(run, split="validate"), replace(run, notes={"a": "b"})]
+    assert [run == other for other in (*changed, "text", replace(run, further={"T_C": run.force}))] == [False] * 5
+    warm = [replace(run, further={"T_C": np.where(run.force > 0, np.nan, 20.0)}) for _ in range(2)]
+    assert warm[0] == warm[1]
+    assert Dataset((changed[0], *after.runs[1:])) != after
 
 
 def test_the_result_of_a_study_is_no_dataset_and_no_rig_files(tmp_path):

@@ -59,6 +59,13 @@ class Dataset(Displayable):
                 raise RunError(f"two runs are called {run.id}", where=f"dataset {self.name}", remedy="rename one")
             ids.add(run.id)
 
+    def __eq__(self, other: object) -> bool:
+        """Tell if two datasets have equal runs in the same order; the name, which a folder gives, does not count."""
+        return self is other or (isinstance(other, Dataset) and self.runs == other.runs)
+
+    def __hash__(self) -> int:
+        return hash(self.runs)
+
     @property
     def headline(self) -> str:
         """Name, runs per rig and number of validation runs."""

@@ -10,8 +10,8 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, wraps
-from typing import Literal, TypeVar
-from weakref import WeakKeyDictionary
+from typing import Any, Literal, TypeVar
+from weakref import ref
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -139,6 +139,15 @@ class Run(Displayable):
             raise RunError(f"split is {shown(self.split)}", where=self._where, remedy="use train or validate")
         object.__setattr__(self, "segments", tuple(self.segments) or ((0, size),))
         object.__setattr__(self, "notes", dict(self.notes))
+
+    def __eq__(self, other: object) -> bool:
+        """Tell if two runs have the same values: one that was saved and loaded equals itself."""
+        if self is other or not isinstance(other, Run) or hash(self) != hash(other):
+            return self is other
+        return all(_equal(getattr(self, name), getattr(other, name)) for name in self.__dataclass_fields__)
+
+    def __hash__(self) -> int:
+        return hash((self.id, self.rig, self.time.size))
 
     @property
     def headline(self) -> str:
@@ -281,6 +290,15 @@ class Run(Displayable):
         return array
 
 
+def _equal(one: Any, other: Any) -> bool:
+    """Tell if two values of a field are equal; missing samples of a further channel are."""
+    if is_a(one, np.ndarray) and is_a(other, np.ndarray):
+        return np.array_equal(one, other, equal_nan=True)
+    if is_a(one, dict):
+        return one.keys() == other.keys() and all(_equal(one[name], other[name]) for name in one)
+    return type(one) is type(other) and bool(one == other)
+
+
 def require_name(what: str, name: object) -> None:
     """Refuse a name that is not safe on a page, in a terminal or in a table.
 
@@ -298,13 +316,15 @@ def once_per_run(function: Callable[[K], T]) -> Callable[[K], T]:
 
     A study uses the motion of a run dozens of times; runs are frozen, so the result cannot change.
     """
-    results: WeakKeyDictionary[K, T] = WeakKeyDictionary()
+    results: dict[int, tuple[ref[K], T]] = {}
 
     @wraps(function)
     def remembered(run: K) -> T:
-        if run not in results:
-            results[run] = function(run)
-        return results[run]
+        key = id(run)  # runs of equal values are not compared
+        entry = results.get(key)
+        if entry is None:
+            entry = results[key] = ref(run, lambda _: results.pop(key, None)), function(run)
+        return entry[1]
 
     return remembered
 
