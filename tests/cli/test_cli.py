@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +19,11 @@ from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.model_file import save_model
 from mrdamper.dampers.modified import ModifiedModel
 from mrdamper.dampers.parameter_map import ParameterMap
+from mrdamper.data import Dataset
+from mrdamper.identification import identify
 from mrdamper.models.bingham import Bingham
-from mrdamper.rig_files.dataset_folder import load_dataset
+from mrdamper.physics.motion import equivalent_sine
+from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
 from mrdamper.statistics.functions.forms import ParameterFunction
 
 
@@ -177,6 +181,17 @@ def test_identify_chosen_runs_with_a_fixed_parameter(tmp_path):
         (row,) = csv.DictReader(file)
     assert float(row["n [-]"]) == 1.0
     assert float(row["nrmse_pp"]) < 0.06
+
+
+def test_identify_and_check_name_records_of_fewer_than_two_cycles(tmp_path):
+    run = load_dataset()["utf_5mm4Hz_1A"].steady()
+    short = run.part(0, int(1.5 / equivalent_sine(run).condition.frequency_Hz / (run.time[1] - run.time[0])))
+    save_dataset(Dataset((replace(short, window=None), replace(run, id="long"))), tmp_path / "d")
+    for command in ("identify", "check"):
+        done = mrdamper(command, tmp_path / "d")
+        assert done.stderr.count("Fewer than two whole cycles in 1 run: utf_5mm4Hz_1A;") == 1, command
+    assert "fewer than two whole cycles" in " ".join(identify(short, "bingham").notes)
+    assert "two whole cycles" not in " ".join(identify(run, "bingham").notes)
 
 
 def test_the_papers_switches_and_a_known_gas_spring():

@@ -172,6 +172,7 @@ def test_the_command_writes_the_band(damper, tmp_path):
     got = runner.invoke(application(), ["predict", str(path), *ask, "--out", str(tmp_path / "b.csv")])
     assert "force_low_N" not in (tmp_path / "b.csv").read_text()
     assert "no prediction interval" in got.stderr
+    assert f"{peak['value']:.4g} N\ndissipated energy" in got.stderr
 
 
 def test_one_session_gives_a_band_for_sessions_like_it_and_one_run_none(tmp_path):

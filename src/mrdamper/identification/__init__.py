@@ -15,6 +15,7 @@ from mrdamper.identification.uncertainty import uncertainty_of_run
 from mrdamper.models import model_type
 from mrdamper.models.base import Model
 from mrdamper.physics.gas_spring import GasSpring
+from mrdamper.physics.motion.sines import MIN_CYCLES
 from mrdamper.statistics.linear import on_one_blas_thread
 from mrdamper.statistics.metrics import score
 
@@ -159,6 +160,8 @@ def _notes(problem: Problem) -> tuple[str, ...]:
         notes.append("mass not identified: at one frequency it is part of k1 (a = −ω² x); k1 holds k1 − m ω²")
     if not problem.analysis.is_sine:
         notes.append(f"the motion is no pure sine (distortion {100 * problem.analysis.distortion:.1f} %)")
+    if problem.analysis.cycles < MIN_CYCLES:
+        notes.append("fewer than two whole cycles: the start of the motion is part of them")
     if problem.run.window is None:
         notes.append("no steady window is given: the whole record was used")
     return tuple(notes)

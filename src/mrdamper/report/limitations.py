@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -20,6 +20,7 @@ from mrdamper.data.wording import counted, number
 from mrdamper.errors import InputError, listed
 from mrdamper.identification import Identification
 from mrdamper.identification.loop_analysis import LoopAnalysis
+from mrdamper.physics.motion.sines import MIN_CYCLES
 from mrdamper.study.contradictions import MIN_RUNS
 from mrdamper.study.recipe import RecipeResult
 from mrdamper.study.validation import Validation
@@ -32,7 +33,6 @@ _MAX_ENERGY_ERROR = 0.15  # relative error of the dissipated energy [-]
 _MAX_DRIFT_M_S = 1e-4  # drift of the mean position [m/s]
 _MAX_CORRELATION = 0.85  # correlation coefficient of tested frequencies and amplitudes [-]
 _MIN_LEVELS = 4  # number of tested currents
-_MIN_CYCLES = 1.95  # cycles of a record from which its repeatability is determined
 _MAX_RUNS = 4  # number of runs named in one sentence
 _SAME_CURRENT_A = 0.01  # difference of currents that are one level [A]
 _SAME_TEMPERATURE_K = 5.0  # difference of temperatures that are one [K]
@@ -291,6 +291,15 @@ def _identifications(identifications: Sequence[Identification]) -> list[str]:
     return sentences + [f"Individual fits: {note}." for note in notes if note.lower().startswith("mass")]
 
 
+def short_records(cycles: Mapping[str, float]) -> list[str]:
+    """Name the runs with fewer than two whole cycles, in a sentence; none where all have more."""
+    short = [run for run, count in cycles.items() if count < MIN_CYCLES]
+    return short and [
+        f"Fewer than two whole cycles in {counted(len(short), 'run')}: {listed(short, _MAX_RUNS)}; "
+        "their repeatability is not determined, and the start of the motion is part of them."
+    ]
+
+
 def _tests(loops: Sequence[LoopAnalysis]) -> list[str]:
     sentences = []
     amplitudes = np.array([loop.condition.amplitude_m for loop in loops])
@@ -309,12 +318,7 @@ def _tests(loops: Sequence[LoopAnalysis]) -> list[str]:
             f"Distorted sine motion in {len(distorted)} of {counted(len(loops), 'run')} (distortion up to "
             f"{100 * worst:.0f} %); identification uses the measured motion."
         )
-    short = [loop.run_id for loop in loops if loop.motion.cycles < _MIN_CYCLES]
-    if short:
-        sentences.append(
-            f"Fewer than two whole cycles in {counted(len(short), 'run')}: {listed(short, _MAX_RUNS)}; "
-            "their repeatability is not determined, and the start of the motion is part of them."
-        )
+    sentences += short_records({loop.run_id: loop.motion.cycles for loop in loops})
     drifting = [loop.run_id for loop in loops if abs(loop.motion.drift) > _MAX_DRIFT_M_S]
     if drifting:
         fastest = max(abs(loop.motion.drift) for loop in loops)

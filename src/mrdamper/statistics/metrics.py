@@ -62,12 +62,24 @@ def dissipated_power(force: Floats, velocity: Floats, time: Floats) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Scores:
-    """Scores of one predicted run; fractions."""
+    """Scores of one predicted run; fractions.
+
+    Attributes
+    ----------
+    nrmse_pp, nrmse_std : float
+        RMS error over the peak-to-peak value, and over the standard deviation, of the measured force.
+    wape : float
+        Σ|e| / Σ|F|.
+    peak_error, energy_error : float
+        Of half the peak-to-peak force and of the dissipated energy, relative; positive if those of the model are too
+        large.
+    mean_relative_error : float
+        Mean of |e| / |F| [Qian et al. 2024, Eq. 44], unbounded where the force crosses zero.
+    """
 
     nrmse_pp: float
     nrmse_std: float
     wape: float
-    # of half the peak-to-peak force and of the dissipated energy, relative; positive if that of the model is too large
     peak_error: float
     energy_error: float
     mean_relative_error: float

@@ -34,6 +34,7 @@ def check(
     An exported FMU is loaded and compared with its reference force.
     """
     from mrdamper.data.atomic import require_writable
+    from mrdamper.report.limitations import short_records
     from mrdamper.rig_files.dataset_folder import load_dataset
     from mrdamper.rig_files.mapping.comparisons import in_another_unit
     from mrdamper.rig_files.quality.table import quality_table, record_of, row
@@ -53,7 +54,8 @@ def check(
     others = in_another_unit([v.record for v in verdicts])
     findings = ((v.record.id, f) for i, v in enumerate(verdicts) for f in (*v.findings, *filter(None, [others.get(i)])))
     repeats = _unequal_repeats([r for r, v in zip(runs, verdicts, strict=True) if v.refusal is None])
-    warn([*refused, *finding_lines(findings, verbose), *repeats])
+    short = short_records({v.record.id: v.figures["cycles"] for v in verdicts if "cycles" in v.figures})
+    warn([*refused, *finding_lines(findings, verbose), *short, *repeats])
     if figure is not None:
         from mrdamper.report.plots.quality import quality_figure
         from mrdamper.rig_files.quality.flat import flagged_samples

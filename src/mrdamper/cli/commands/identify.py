@@ -35,6 +35,8 @@ def identify(
     from mrdamper.data.encoding import csv_text
     from mrdamper.identification.methods import method_named
     from mrdamper.models import model_type
+    from mrdamper.physics.motion.sines import analyse_motion
+    from mrdamper.report.limitations import short_records
     from mrdamper.report.tables import identification_rows
     from mrdamper.rig_files.dataset_folder import load_dataset
     from mrdamper.study.usable_runs import usable_sines
@@ -54,6 +56,7 @@ def identify(
     warn(f"not identified: {name}: {why}" for name, why in refused.items())
     put(identification_rows(identifications, dataset.name), out, as_json, csv_text)
     doubts = [f"warning: run {one.run_id}: {doubt}" for one in identifications for doubt in one.doubts]
+    warn(short_records({entry.id: analyse_motion(entry).cycles for entry in sines}))
     warn(doubts[:_MAX_WARNINGS])
     if len(doubts) > _MAX_WARNINGS:
         typer.echo(f"warning: {len(doubts) - _MAX_WARNINGS} more of this kind in the column notes", err=True)

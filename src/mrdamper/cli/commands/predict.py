@@ -71,9 +71,9 @@ def predict(
     if check_run:
         prediction, interval = _session_known(damper, prediction, check_run, data, level)
     summary = _summary(prediction, interval)
-    typer.echo(
-        _in_words(summary, interval, level, scope(damper, level)) if interval else f"note: {no_band(damper)}", err=True
-    )
+    typer.echo(_in_words(summary, interval, level, scope(damper, level)), err=True)
+    if interval is None:
+        typer.echo(f"note: {no_band(damper)}", err=True)
     if plot is not None:
         from mrdamper.report.plots.loops import predicted_force
 
@@ -156,9 +156,17 @@ def _summary(prediction: Prediction, interval: Band | None) -> dict[str, tuple[f
     }
 
 
-def _in_words(summary: dict[str, tuple[float, float, float]], interval: Band, level: float, where: str) -> str:
+def _in_words(summary: dict[str, tuple[float, float, float]], interval: Band | None, level: float, where: str) -> str:
     from mrdamper.data.wording import number, span
 
+    peak, energy, damping = summary.values()
+    lines = [
+        f"peak force (half the peak-to-peak force) {number(peak[0])} N",
+        f"dissipated energy {number(energy[0])} J per cycle",
+        f"equivalent damping {number(damping[0])} N s/m",
+    ]
+    if interval is None:
+        return "\n".join(lines)
     parts = ", ".join(
         f"{name} {number(float((part**2).mean() ** 0.5), 3)} N"
         for name, part in (("parameters", interval.parameter), ("session", interval.session), ("model", interval.model))
@@ -167,14 +175,9 @@ def _in_words(summary: dict[str, tuple[float, float, float]], interval: Band, le
     corrected = ""
     if interval.session.any():
         corrected = f"; with gain and offset of the session corrected {span(*interval.known_session, 'N', 4, ' to ')}"
-    peak, energy, damping = summary.values()
-    return "\n".join(
-        (
-            f"peak force (half the peak-to-peak force) {number(peak[0])} N, "
-            f"{100 * level:g} % prediction interval {span(*peak[1:], 'N', 4, ' to ')} "
-            f"{where}{corrected}",
-            f"dissipated energy {number(energy[0])} J per cycle ({number(energy[1])} to {number(energy[2])})",
-            f"equivalent damping {number(damping[0])} N s/m ({number(damping[1])} to {number(damping[2])})",
-            f"standard deviation of the force: {parts}",
-        )
+    ends = (
+        f", {100 * level:g} % prediction interval {span(*peak[1:], 'N', 4, ' to ')} {where}{corrected}",
+        *(f" ({number(low)} to {number(high)})" for _, low, high in (energy, damping)),
     )
+    lines = [line + end for line, end in zip(lines, ends, strict=True)]
+    return "\n".join([*lines, f"standard deviation of the force: {parts}"])

@@ -15,6 +15,7 @@ from mrdamper.physics.motion.harmonics import HarmonicSeries, fit_harmonics, fun
 from mrdamper.physics.motion.measured import measured_motion
 
 SINE_DISTORTION_LIMIT = 0.05  # limit of the distortion of a sine for harmonic balance
+MIN_CYCLES = 1.95  # cycles of a record below which the start of the motion is a part of it
 STRAY_LIMIT = 0.3  # of the RMS displacement: remainder above which another motion is added to the sine
 _VELOCITY_DISTORTION_LIMIT = 0.6  # above that of a triangle (0.48): a second tone at a multiple of the frequency
 _MEASURED_HARMONICS = 7  # number of harmonics of a measured motion
