@@ -105,7 +105,8 @@ def test_accuracy_is_compared_on_the_validation_runs(own, want):
 
 
 @pytest.mark.parametrize(
-    ("own", "count", "want"), [(0.03, 7, "agrees"), (0.9, 7, "agrees in part"), (0.9, 2, "differs")]
+    ("own", "count", "want"),
+    [(0.03, 7, "agrees"), (0.04, 7, "agrees in part"), (0.03, 2, "agrees in part"), (0.9, 7, "differs")],
 )
 def test_few_parameters_are_judged_by_error_and_count(own, count, want):
     contenders = {LITERAL: scored(median=own, worst=own), ALI: scored(median=0.03, parameters_per_run=count)}

@@ -275,17 +275,22 @@ def _r2_over_motions(name: str, form: str, study: Reproduction, axes: Texts) -> 
         with suppress(IdentificationError):
             conditions = [study.conditions[i] for i in group]
             fit = fit_function(form, conditions, values[group], log=name == "beta")
-            shares[motion_name(conditions[0]).replace(", ", "\n")] = fit.r2
+            shares[motion_name(conditions[0])] = fit.r2
     if not shares:
         return "too few currents at every motion"
     figure, panel = _figure(axes, 2.7, bottom=0.6)
-    panel.plot(range(len(shares)), list(shares.values()), label="R²", color=MEASURED, ls=":", **_POINTS)
-    panel.x.places, panel.x.texts, panel.y.low = range(len(shares)), list(shares), min(0.0, *shares.values())
+    for at, (motion, share) in enumerate(shares.items()):
+        panel.plot([at], [share], label=motion, color=MEASURED, **_POINTS)
+    panel.x.places, panel.x.texts = range(len(shares)), [motion.replace(", ", "\n") for motion in shares]
+    panel.y.low = min(0.0, *shares.values())
     return figure
 
 
 def _constant_term(name: str, form: str, study: Reproduction, axes: Texts) -> Drawing:
-    """Draw a quantity less its function of current, one point per motion, over frequency or f · A."""
+    """Draw a quantity less its function of current, one point per motion, over frequency or f · A.
+
+    A plane has a line an amplitude [Qian et al. 2024, Eq. 34].
+    """
     values = _parameter(study, name)
     if values.size != len(study.conditions):
         return f"{name} was not identified on every run"
@@ -301,16 +306,18 @@ def _constant_term(name: str, form: str, study: Reproduction, axes: Texts) -> Dr
     (x, y), by_speed = axes[0], name == "F0"
     y, power = powered(y, float(np.max(np.abs(level))))
     u = [MM * c.frequency_Hz * c.amplitude_m if by_speed else c.frequency_Hz for c in firsts]
-    shades, dash = current_colours([c.peak_velocity for c in firsts]), {"mark": "_", "ms": 11, "mew": 1.4}
+    amplitudes = [round(np.log(c.amplitude_m) / SAME) for c in firsts]
+    steps = amplitudes if form == "plane" else [c.peak_velocity for c in firsts]
+    shades, dash = current_colours(steps), {"mark": "_", "ms": 11, "mew": 1.4}
     figure, panel = _figure([(x, y)], 3.0, right=2.0)
-    for c, at, value, curve in zip(firsts, u, power * level, power * fitted, strict=True):
-        panel.plot([at], [value], label=motion_name(c), color=shades[c.peak_velocity], **_POINTS)
-        panel.plot([at], [curve], color=shades[c.peak_velocity], **dash)
+    for c, step, at, value, curve in zip(firsts, steps, u, power * level, power * fitted, strict=True):
+        panel.plot([at], [value], label=motion_name(c), color=shades[step], **_POINTS)
+        panel.plot([at], [curve], color=shades[step], **dash)
     dense = np.linspace(min(u), max(u), 40)
-    amplitudes = {round(np.log(c.amplitude_m) / SAME): c.amplitude_m for c in firsts}
-    pairs = [(np.ones(40), dense / MM)] if by_speed else [(dense, A) for A in amplitudes.values()]
-    for f, A in pairs:
-        panel.plot(dense, power * function(0.0, f, A) * np.ones(40), lw=0.7, color=MEASURED, alpha=0.6)
+    lines = {step: (dense, c.amplitude_m) for step, c in zip(amplitudes, firsts, strict=True)}
+    for step, (f, A) in {0: (np.ones(40), dense / MM)}.items() if by_speed else lines.items():
+        color, label = (shades[step], f"{MM * A:.3g} mm") if form == "plane" else (MEASURED, "")
+        panel.plot(dense, power * function(0.0, f, A) * np.ones(40), lw=0.7, alpha=0.6, color=color, label=label)
     panel.plot([], [], label="by the function", color=MEASURED, **dash)
     panel.title = _r2(explained_variance(level, fitted), " over the motions") or "one motion: no R²"
     panel.legend("right", size=_SMALL)
