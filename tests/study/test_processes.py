@@ -1,5 +1,6 @@
 """Worker processes end with the one that started them, however that ends."""
 
+import gc
 import os
 import signal
 import subprocess
@@ -41,6 +42,11 @@ def test_workers_are_gone_when_their_parent_is(tmp_path, fault):
     while any(map(alive, workers)) and time.monotonic() < deadline:
         time.sleep(0.02)
     assert not any(map(alive, workers))
+
+
+def test_a_worker_collects_garbage_as_rarely_as_the_command_line():
+    with processes(1) as pool:
+        assert pool.submit(gc.get_threshold).result()[0] == 50_000
 
 
 def test_a_worker_that_dies_is_said_with_a_code():

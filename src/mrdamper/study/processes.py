@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import signal
 import sys
 import threading
@@ -136,5 +137,6 @@ SPAWNED = _Context()  # starts such processes
 
 
 def _begin() -> None:
+    gc.set_threshold(50_000)  # as in the parent
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the terminal sends it to all; the parent decides
     end_with_parent()
