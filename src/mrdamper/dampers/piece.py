@@ -15,6 +15,7 @@ from mrdamper.models.recorded import CHANNELS, channel, compiled_outputs, traced
 from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.physics.motion.sines import centred_motion, equivalent_sine
 from mrdamper.tracing import Tape
+from mrdamper.tracing.compiled.record import Channels
 from mrdamper.tracing.tangent import with_tangents
 
 _REFERENCE = ("I_r", "f_r", "A_r")  # names of a reference condition among the numbers of a damper
@@ -72,7 +73,7 @@ class Pieces:
             [rows + at for rows, at in zip(scored, self.begins, strict=True)]
         )
         self.force = np.concatenate([piece.force for piece in self.pieces])
-        self._channels: dict[str, Floats] = {}
+        self._read: dict[tuple[str, ...], Channels] = {}
         self.scale = np.repeat([piece.scale for piece in self.pieces], [rows.size for rows in scored])
 
     def residual(self, damper: Any) -> Floats:
@@ -102,6 +103,7 @@ class Pieces:
             damper.numbers,
             traced,
             tuple(dict.fromkeys((*CHANNELS, *_SINE))),
+            self._read,
             self._channel,
             self.picked,
             self.begins,
@@ -109,14 +111,12 @@ class Pieces:
 
     def _channel(self, name: str) -> Floats:
         """(N,) channel of the motions, or of the sine each of them is."""
-        if name not in self._channels:
-            sine = _SINE.get(name)
-            self._channels[name] = np.concatenate(
-                [
-                    channel(piece.motion, name)
-                    if sine is None
-                    else np.full(len(piece.motion), getattr(piece.condition, sine))
-                    for piece in self.pieces
-                ]
-            )
-        return self._channels[name]
+        sine = _SINE.get(name)
+        return np.concatenate(
+            [
+                channel(piece.motion, name)
+                if sine is None
+                else np.full(len(piece.motion), getattr(piece.condition, sine))
+                for piece in self.pieces
+            ]
+        )

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import wraps
+from functools import partial, wraps
 from typing import Any, TypeVar, cast
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.physics.motion.path import memoize_per_path
 from mrdamper.physics.motion.traced import TracedMotion, TracedStep
 from mrdamper.tracing import Tape, TraceError, program
-from mrdamper.tracing.compiled.record import RecordProgram
+from mrdamper.tracing.compiled.record import Channels, RecordProgram
 from mrdamper.tracing.program import postorder
 from mrdamper.tracing.tangent import with_tangents
 
@@ -80,6 +81,8 @@ def force_tangents(
 
 
 _PROGRAMS: dict[tuple[object, ...], list[RecordProgram]] = {}
+# Channels by the names of the inputs of programs: a search runs programs along one motion hundreds of times.
+_READ: WeakKeyDictionary[Excitation, dict[tuple[str, ...], Channels]] = WeakKeyDictionary()
 
 
 def _along(
@@ -93,13 +96,14 @@ def _along(
     kind: Any = model.__class__
     values = model.values()
     short = len(motion) < _MIN_COMPILED_SAMPLES and not kind.integrated
-    if short or not all(isinstance(value, float | int) for value in values.values()):
+    if short or not all(isinstance(value, (float, int)) for value in values.values()):
         return None
 
     def traced(tape: Tape, free: Mapping[str, Any], inputs: Sequence[Any]) -> Mapping[str, Any]:
         return outputs(kind(**free), traced_motion(tape, inputs), tape)
 
-    return compiled_outputs((kind, names), values, traced, CHANNELS, lambda name: channel(motion, name), picked)
+    read = _READ.setdefault(motion, {})
+    return compiled_outputs((kind, names), values, traced, CHANNELS, read, partial(channel, motion), picked)
 
 
 def compiled_outputs(
@@ -107,6 +111,7 @@ def compiled_outputs(
     values: Mapping[str, float],
     traced: Callable[[Tape, Mapping[str, Any], Sequence[Any]], Mapping[str, Any]],
     inputs: Sequence[str],
+    read: dict[tuple[str, ...], Channels],
     channel: Callable[[str], Floats],
     picked: NDArray[np.intp] | None = None,
     begins: NDArray[np.intp] | None = None,
@@ -115,7 +120,8 @@ def compiled_outputs(
 
     `key` is that of the cached programs: traced model type, and parameters of the tangents. `traced` writes the outputs
     at one sample on a tape, from parameters, whose values are `values`, and inputs. `channel` returns the (N,) array of
-    an input that the program uses. Outputs are those at the samples `picked`, and the memory is reset at `begins`.
+    an input; `read` caches those that programs use. Outputs are those at the samples `picked`, and the memory is reset
+    at `begins`.
     """
     given = tuple(map(float, values.values()))
     # Values are given by position: another order is another program.
@@ -135,8 +141,9 @@ def compiled_outputs(
             return None
         derived = record.prepare(given)
         programs.append(record)
-    arrays = [channel(name) for name in record.program.tape.inputs]
-    result = derived is not None and record.compiled_along(given, derived, record.starts, arrays, picked, begins)
+    if (used := tuple(record.program.tape.inputs)) not in read:
+        read[used] = Channels.of(map(channel, used))
+    result = derived is not None and record.compiled_along(given, derived, record.starts, read[used], picked, begins)
     return result.outputs if result and result.failed < 0 else None
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +21,27 @@ _MIN_COMPILED_LINES = 1_000_000  # lines executed in the interpreter, from which
 _COMPARED_SAMPLES = 24  # samples on which a new library is compared with the interpreter
 _POSITIVE = {"current": 1.0, "frequency": 1.0, "amplitude": 1e-2}  # positive inputs of this comparison [A], [Hz], [m]
 _MAX_DIFFERENCE = 1e-9  # relative difference allowed in this comparison
+
+
+@dataclass(frozen=True, eq=False)
+class Channels:
+    """Inputs along a record, and their addresses and strides for a library."""
+
+    arrays: Sequence[Floats]  # each (N,), in the order of the program's inputs
+    places: NDArray[np.uintp]
+    strides: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, channels: Iterable[ArrayLike]) -> Self:
+        """Locate the elements of arrays, which are converted if they are no floats."""
+        arrays = [np.asarray(channel, dtype=float) for channel in channels]
+        places = np.array([array.ctypes.data for array in arrays], dtype=np.uintp)
+        return cls(arrays, places, np.array([array.strides[0] // 8 for array in arrays], dtype=np.int64))
+
+    @cached_property
+    def addresses(self) -> tuple[ctypes.c_void_p, ctypes.c_void_p]:
+        """Pointers to the addresses and to the strides."""
+        return address(self.places), address(self.strides)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,10 +79,9 @@ class RecordProgram:
         a damper at rest.
         """
         arrays = [np.asarray(channel, dtype=float) for channel in channels]
-        size = arrays[0].size
-        self._walked += size * self.lines
+        self._walked += arrays[0].size * self.lines
         if self._walked > _MIN_COMPILED_LINES and (library := self._library) is not None:
-            return self._run(library, given, derived, memory, arrays)
+            return self._run(library, given, derived, memory, Channels.of(arrays))
         return self.interpreted_along(given, derived, memory, arrays)
 
     def compiled_along(
@@ -68,7 +89,7 @@ class RecordProgram:
         given: Sequence[float],
         derived: Sequence[float],
         memory: Sequence[float],
-        channels: Sequence[ArrayLike],
+        channels: Sequence[ArrayLike] | Channels,
         picked: NDArray[np.intp] | None = None,
         begins: NDArray[np.intp] | None = None,
     ) -> Along | None:
@@ -78,8 +99,8 @@ class RecordProgram:
         """
         if (library := self._library) is None:
             return None
-        arrays = [np.asarray(channel, dtype=float) for channel in channels]
-        return self._run(library, given, derived, memory, arrays, picked, begins)
+        channels = channels if isinstance(channels, Channels) else Channels.of(channels)
+        return self._run(library, given, derived, memory, channels, picked, begins)
 
     def interpreted_along(
         self, given: Sequence[float], derived: Sequence[float], memory: Sequence[float], arrays: Sequence[Floats]
@@ -102,25 +123,26 @@ class RecordProgram:
         given: Sequence[float],
         derived: Sequence[float],
         memory: Sequence[float],
-        arrays: Sequence[Floats],
+        channels: Channels,
         picked: NDArray[np.intp] | None = None,
         begins: NDArray[np.intp] | None = None,
     ) -> Along:
-        p, d, s = (np.array([*values, 0.0], dtype=float) for values in (given, derived, memory))
-        size = arrays[0].size
+        numbers = np.array([*given, 0.0, *derived, 0.0, *memory, 0.0], dtype=float)
+        p = numbers.ctypes.data
+        d = p + 8 * (len(given) + 1)
+        s = d + 8 * (len(derived) + 1)
+        size = channels.arrays[0].size
         outputs = np.empty((len(self.program.outputs), size if picked is None else picked.size))
-        places = np.array([array.ctypes.data for array in arrays], dtype=np.uintp)
-        strides = np.array([array.strides[0] // 8 for array in arrays], dtype=np.int64)
         indices = None if picked is None else np.ascontiguousarray(picked, dtype=np.int64)
         restarts = None if begins is None else np.append(begins, size).astype(np.int64)
         along = library.along
         along.restype = ctypes.c_longlong
         failed = along(
-            address(p), address(d), address(s), ctypes.c_longlong(size), address(places), address(strides),
+            ctypes.c_void_p(p), ctypes.c_void_p(d), ctypes.c_void_p(s), ctypes.c_longlong(size), *channels.addresses,
             None if indices is None else address(indices), ctypes.c_longlong(outputs.shape[1]),
             None if restarts is None else address(restarts), address(outputs),
         )  # fmt: skip
-        return Along(outputs, tuple(s[:-1].tolist()), int(failed))
+        return Along(outputs, tuple(numbers[-1 - len(memory) : -1].tolist()), int(failed))
 
     @cached_property
     def lines(self) -> int:
@@ -147,7 +169,7 @@ class RecordProgram:
         derived = self.prepare(given)
         if derived is None:
             return True
-        outputs = self._run(library, given, derived, self.starts, arrays)
+        outputs = self._run(library, given, derived, self.starts, Channels.of(arrays))
         expected = self.interpreted_along(given, derived, self.starts, arrays)
         size = _COMPARED_SAMPLES if expected.failed < 0 else expected.failed
         if 0 <= outputs.failed < size:  # a division by zero raises in the interpreter, and may have no effect in C
