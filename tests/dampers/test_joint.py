@@ -378,7 +378,7 @@ def test_samples_of_some_runs_are_those_they_have_among_all(problem, fit):
     assert np.all(
         some.solve(fit.point).nrmse_pp.mean() <= np.sqrt(missed).mean() * 1.001
     )  # their own linear parameters
-    assert some.linear_columns(fit.point)[1].size == some.picked.size < whole.picked.size
+    assert some.linear_forces(fit.point)[1].shape[1] == some.picked.size < whole.picked.size
 
 
 def test_a_fit_begins_where_another_problem_ended(problem, fit):

@@ -30,3 +30,15 @@ def test_newton_stays_inside_the_box_at_its_upper_end():
 
     found = newton_refine(gradient, np.array([1.0, 0.31]), np.zeros(2), upper)
     np.testing.assert_allclose(found, [1.0, 0.3], atol=1e-12)
+
+
+def test_half_of_a_symmetric_curvature_suffices():
+    matrix, centre, asked = np.array([[2.0, 0.3], [0.3, 1.0]]), np.array([1.0, 0.7]), []
+
+    def first(u, count):
+        asked.append(count)
+        return (matrix @ (u - centre))[:count]
+
+    found = newton_refine(lambda u: matrix @ (u - centre), NEAR, np.zeros(2), np.full(2, 2.0), first)
+    np.testing.assert_allclose(found, centre, atol=1e-12)
+    assert asked == [1, 2]

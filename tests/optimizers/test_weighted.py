@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
+from mrdamper.statistics import linear
 from mrdamper.statistics.linear import (
+    gram_of,
+    products_of,
     products_of_rest,
     project_out_columns,
     solve_bounded,
@@ -46,3 +49,12 @@ def test_products_of_a_rest_are_those_of_the_projected_columns(angle):
     np.testing.assert_allclose(products_of_rest(columns, right), rest.T @ rest, rtol=1e-8)
     few = products_of_rest(columns[:3], right[:3])  # fewer rows than columns
     np.testing.assert_allclose(few, np.zeros((3, 3)), atol=1e-8)
+
+
+@pytest.mark.parametrize("most", [1, 100, 10**6])  # multiplications of a block: many blocks of one column, or one block
+def test_products_of_rows_in_blocks_are_those_of_all_columns(most, monkeypatch):
+    monkeypatch.setattr(linear, "_SMALL_PRODUCT", most)
+    table = np.random.default_rng(7).standard_normal((5, 43))
+    np.testing.assert_allclose(products_of(table[:4], table), (table @ table.T)[:4], atol=1e-12)
+    for count in (1, 5):
+        np.testing.assert_allclose(gram_of(table[:count]), (table @ table.T)[:count, :count], atol=1e-12)

@@ -22,7 +22,7 @@ from mrdamper.models.base import Model
 from mrdamper.models.recorded import force_tangents
 from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.statistics.levenberg_marquardt import forward_differences, least_squares
-from mrdamper.statistics.linear import products_without, project_out, robust_weights, solve_bounded
+from mrdamper.statistics.linear import products_of, products_without, project_out, robust_weights, solve_bounded
 
 MIN_ERROR_PP = 1e-3  # nrmse_pp below which a run gains no more weight
 _REFIT_ROUNDS = 3  # rounds of weights on derivatives that are known
@@ -38,6 +38,7 @@ class LinearSolution:
     nrmse_pp: Floats  # (R,) of each run
     held: tuple[str, ...]  # linear parameters at a bound
     columns: Floats  # (N, K) weighted, of the others
+    gram: Floats  # (K, K) products of these
 
 
 class JointResiduals:
@@ -59,7 +60,7 @@ class JointResiduals:
         self.bounds = bounds_of(space.linear)
         self._set_weights(self.information)
         self._seen: tuple[Excitation, Excitation] | None = None
-        self._columns_at: tuple[Floats, Model, Floats, Floats] | None = None
+        self._columns_at: tuple[Floats, Model, Floats, Sequence[int]] | None = None
 
     def only(self, runs: Sequence[int]) -> JointResiduals:
         """Return the samples of some of the runs, in order; the others are evaluated but not used."""
@@ -71,8 +72,8 @@ class JointResiduals:
         table._seen = None
         table._set_weights(table.information)
         if self._columns_at is not None:
-            point, reduced, base, columns = self._columns_at
-            table._columns_at = point, reduced, base[kept], columns[kept]
+            point, reduced, forces, places = self._columns_at
+            table._columns_at = point, reduced, forces[:, kept], places
         return table
 
     def _motion(self, point: Floats) -> Excitation:
@@ -106,39 +107,47 @@ class JointResiduals:
             self._seen = motion, motion.part(self.picked)
         return self._seen[1], model.state(motion)[self.picked]
 
-    def linear_columns(self, point: Floats) -> tuple[Model, Floats, Floats]:
-        """Model at a point without its linear parameters, its force [N], and the force per unit of each.
+    def linear_forces(self, point: Floats) -> tuple[Model, Floats, Sequence[int]]:
+        """Model at a point without its linear parameters, and forces [N]: its own, and that per unit of parameters.
 
-        Cached for the last point, independent of weights.
+        Returns the places of the linear parameters among these forces, too. Cached for the last point, independent of
+        weights.
         """
         if self._columns_at is None or not np.array_equal(self._columns_at[0], point):
             reduced = self.space.without_linear(point)
             self._columns_at = point, reduced, *self._linear_table(reduced, point)
         return self._columns_at[1:]
 
-    def _linear_table(self, reduced: Model, point: Floats) -> tuple[Floats, Floats]:
-        """Force of a model without linear parameters, and the force per unit of each, in one pass if possible."""
+    def _linear_table(self, reduced: Model, point: Floats) -> tuple[Floats, Sequence[int]]:
+        """Return forces of `linear_forces`, in one pass if possible, and the places."""
         motion, linear = self._motion(point), self.space.linear
         names = [info.name for info in type(reduced).parameters() if info.linear]  # one program for all problems
         rows = force_tangents(reduced, motion, names, self.picked)
         if rows is None:
-            return linear_table(reduced, linear, *self._followed(reduced, point))
-        return rows[0], rows[[1 + names.index(info.name) for info in linear]].T
+            base, columns = linear_table(reduced, linear, *self._followed(reduced, point))
+            return np.vstack([base, columns.T]), range(1, 1 + len(linear))
+        return rows, [1 + names.index(info.name) for info in linear]
 
     def solve(self, point: Floats) -> LinearSolution:
         """Linear parameters of least weighted squares at a point of the search axes; cached for the last point."""
         if self._solved is not None and np.array_equal(self._solved[0], point):
             return self._solved[1]
         linear, factor = self.space.linear, self.factor
-        reduced, base, columns = self.linear_columns(point)
-        columns, right = columns * factor[:, None], (self.target - base) * factor
-        solution, held = solve_bounded(columns, right, *self.bounds)
+        reduced, forces, places = self.linear_forces(point)
+        rows = np.empty((len(places) + 1, factor.size))
+        for row, place in zip(rows, places, strict=False):
+            np.multiply(forces[place], factor, out=row)
+        right = np.multiply(self.target - forces[0], factor, out=rows[-1])
+        columns, products = rows[:-1].T, products_of(rows[:-1], rows)
+        solution, held = solve_bounded(columns, right, *self.bounds, products)
         residual = columns @ solution - right
         errors = np.sqrt(np.add.reduceat(residual**2, self.begins)) / self.weights
         model = replace(reduced, **{i.name: float(s) for i, s in zip(linear, solution, strict=True)})
         stopped = tuple(i.name for i, h in zip(linear, held, strict=True) if h)
-        free = columns[:, ~held] if stopped else columns
-        self._solved = point, LinearSolution(model, residual, errors, stopped, free)
+        gram = products[:, :-1]
+        if stopped:
+            columns, gram = columns[:, ~held], gram[~held][:, ~held]
+        self._solved = point, LinearSolution(model, residual, errors, stopped, columns, gram)
         return self._solved[1]
 
     def solved_residual(self, point: Floats) -> Floats:
@@ -153,10 +162,11 @@ class JointResiduals:
         """
         solved = self.solve(point)
         moved, slopes = self._moved(point, solved.model, solved.residual)
-        return moved @ (slopes @ solved.residual), moved @ products_without(solved.columns, slopes) @ moved.T
+        products = products_without(solved.columns, slopes, solved.gram)
+        return moved @ (slopes @ solved.residual), moved @ products @ moved.T
 
-    def gradient(self, point: Floats) -> Floats:
-        """(D,) half the slope of the cost, with the linear parameters refitted.
+    def gradient(self, point: Floats, count: int | None = None) -> Floats:
+        """(D,) half the slope of the cost along all axes or the first, with the linear parameters refitted.
 
         Each derivative is a difference across a thousandth of the box, because the residual has a kink where a sample
         reaches the end of the play, at which a derivative would jump.
@@ -164,8 +174,8 @@ class JointResiduals:
         solved, weights = self.solve(point), self.weights[self.owner]
         lower, upper = self.space.box()
         reach = np.minimum(_DIFFERENCE_RATIO * (upper - lower), np.minimum(point - lower, upper - point))
-        slope = np.zeros(point.size)
-        for i in np.flatnonzero(reach):
+        slope = np.zeros(point.size)[:count]
+        for i in np.flatnonzero(reach[:count]):
             step = np.where(np.arange(point.size) == i, reach, 0.0)
             rise = self.residual(point + step, solved.model) - self.residual(point - step, solved.model)
             slope[i] = (rise * weights) @ solved.residual / (2 * reach[i])
@@ -195,7 +205,8 @@ class JointResiduals:
     def linearise(self, point: Floats, model: Model) -> tuple[Floats, Floats]:
         """Weighted residual of a model, and its derivatives by search axes and linear parameters."""
         residual = self.residual(point, model) * self.weights[self.owner]
-        columns = self.linear_columns(point)[2] * self.factor[:, None]
+        _, forces, places = self.linear_forces(point)
+        columns = forces[places].T * self.factor[:, None]
         moved, slopes = self._moved(point, model, residual)
         return residual, np.column_stack([(moved @ slopes).T, columns])
 

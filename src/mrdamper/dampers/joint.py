@@ -342,7 +342,7 @@ class JointProblem:
                 )  # fmt: skip
                 point, ending = solution.point, solution.ending
                 if to_the_last_digit and not left:
-                    point = newton_refine(table.gradient, point, *self.space.box())
+                    point = newton_refine(table.gradient, point, *self.space.box(), table.gradient)
             table.weigh(table.solve(point).nrmse_pp)
         solved = table.solve(point)
         return JointFit(

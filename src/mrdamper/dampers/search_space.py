@@ -94,8 +94,16 @@ class SearchSpace:
 
     def without_linear(self, point: Floats) -> Model:
         """Return the model at a point of the search axes, its linear parameters zero."""
-        values = {name: v for name, v in values_at(self.axes, point).items() if name not in (RISE, FALL)}
-        return self.model_type.build({**self.fixed, **values, **{info.name: 0.0 for info in self.linear}})
+        values = values_at(self._own_axes, point[: len(self._own_axes)])
+        return self.model_type.build({**self._held, **values})
+
+    @cached_property
+    def _own_axes(self) -> list[SearchAxis]:
+        return [axis for axis in self.axes if axis.name not in (RISE, FALL)]
+
+    @cached_property
+    def _held(self) -> dict[str, float]:
+        return {**self.fixed, **{info.name: 0.0 for info in self.linear}}
 
     def with_linear_of(self, model: Model, point: Floats) -> Model:
         """Return the model at a point of the search axes with the linear parameters of another."""

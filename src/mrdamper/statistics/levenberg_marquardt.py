@@ -142,25 +142,34 @@ def _lengthened(
     return reached, tried
 
 
-def newton_refine(gradient: Callable[[Floats], Floats], point: Floats, lower: Floats, upper: Floats) -> Floats:
+def newton_refine(
+    gradient: Callable[[Floats], Floats],
+    point: Floats,
+    lower: Floats,
+    upper: Floats,
+    first: Callable[[Floats, int], Floats] | None = None,
+) -> Floats:
     """Refine the minimum next to a point where a search has stopped, to the last digits.
 
     The cost determines its minimum to half of the digits only, and the end of a search by the cost depends on rounding.
     The gradient (D,) at a point (D,), without noise and without jumps, determines all of them: Newton steps on it, with
     the curvature by differences, end below 1e-13 of the box. If they do not converge nearby, at a bound or in a flat
-    region, the point is kept.
+    region, the point is kept. Where the gradient is costly, `first` calculates a number of its first components: half
+    of the curvature, which is symmetric.
     """
     width = upper - lower
     free = (point > lower) & (point < upper)
-    first = gradient(point)
+    here = slope = gradient(point)
     # Steps that stay inside, in widths of the box.
     shares = np.where(point + _CURVED * width > upper, -_CURVED, _CURVED)
-    pairs = zip(np.diag(shares * width), shares, strict=True)
-    curvature = np.stack([(gradient(point + step) - first) * width / share for step, share in pairs])
-    curvature = (curvature + curvature.T)[np.ix_(free, free)] / 2
+    curvature = np.empty((point.size, point.size))
+    for i, step in enumerate(np.diag(shares * width)):
+        moved = (gradient(point + step) if first is None else first(point + step, i + 1))[: i + 1]
+        curvature[i, : i + 1] = curvature[: i + 1, i] = (moved - here[: i + 1]) * width[: i + 1] / shares[i]
+    curvature = curvature[np.ix_(free, free)]
     if not free.any() or _is_plain(curvature):
         return point
-    refined, slope, moved = point, first, np.inf
+    refined, moved = point, np.inf
     for _ in range(_POLISHING):
         step = np.zeros(point.size)
         step[free] = -np.linalg.solve(curvature, (slope * width)[free])

@@ -24,6 +24,7 @@ _RANK_LIMIT = 1e-10  # singular value over the largest below which a direction i
 _MIN_RELATIVE_PIVOT = 1e-5  # pivot over the largest below which a column is explained by the others
 
 _ROWS_PER_BLOCK = 50_000  # rows of a table that are factored at a time
+_SMALL_PRODUCT = 1_000_000  # multiplications of a matrix product up to which OpenBLAS copies nothing
 
 
 def solve_linear(columns: Floats, right: Floats, rank_limit: float | None = None) -> Floats:
@@ -94,22 +95,49 @@ def project_out(columns: Floats, slopes: Floats) -> Floats:
     return np.subtract(slopes, taken.T, out=taken.T)
 
 
-def products_without(columns: Floats, slopes: Floats) -> Floats:
-    """(K, K) products of slopes (K, N) projected as `project_out` does, without the projected slopes themselves."""
-    gram, cross = columns.T @ columns, slopes @ columns
+def products_without(columns: Floats, slopes: Floats, gram: Floats) -> Floats:
+    """(K, K) products of slopes (K, N) projected as `project_out` does, without the projected slopes themselves.
+
+    `gram` (L, L) are the products of the columns.
+    """
     scale = _sizes(gram)
-    unit = cross / scale
+    unit = products_of(slopes, columns.T) / scale
     normal = gram / scale / scale[:, None] + _RIDGE * np.eye(scale.size)
-    return slopes @ slopes.T - unit @ np.linalg.solve(normal, unit.T)
+    return gram_of(slopes) - unit @ np.linalg.solve(normal, unit.T)
 
 
-def solve_bounded(columns: Floats, right: Floats, lower: Floats, upper: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+def gram_of(rows: Floats) -> Floats:
+    """(K, K) products of rows (K, N) with each other, by `products_of`."""
+    gram: Floats = np.empty((len(rows), len(rows)))
+    gram[:-1] = products_of(rows[:-1], rows)
+    gram[-1, :-1], gram[-1, -1] = gram[:-1, -1], rows[-1] @ rows[-1]
+    return gram
+
+
+def products_of(rows: Floats, others: Floats) -> Floats:
+    """(K, M) products of few rows (K, N) and others (M, N), a block of columns at a time.
+
+    If some of the others are the rows themselves, there should be further ones: a symmetric product of BLAS takes three
+    times as long, and a product too large for its code for small matrices twice.
+    """
+    step = max(1, _SMALL_PRODUCT // max(1, len(rows) * len(others)))
+    begins = range(0, max(1, rows.shape[1]), step)
+    blocks = [rows[:, i : i + step] @ others[:, i : i + step].T for i in begins]
+    return sum(blocks[1:], start=blocks[0])
+
+
+def solve_bounded(
+    columns: Floats, right: Floats, lower: Floats, upper: Floats, products: Floats | None = None
+) -> tuple[Floats, NDArray[np.bool_]]:
     """Least squares with bounds on the coefficients (L,), by holding violated ones at their bound.
 
-    Returns the coefficients, and which of them ended at a bound.
+    Returns the coefficients, and which of them ended at a bound. `products` (L, L + 1) are those of the columns with
+    each other and with the right side, if known.
     """
-    gram = columns.T @ columns
-    solution, held = _solved(columns, right, gram, right @ columns), np.zeros(len(gram), dtype=bool)
+    if products is None:
+        products = np.column_stack([columns.T @ columns, right @ columns])
+    gram = products[:, :-1]
+    solution, held = _solved(columns, right, gram, products[:, -1]), np.zeros(len(gram), dtype=bool)
     while (outside := ~held & ((solution < lower) | (solution > upper))).any():
         held |= outside
         free, solution = ~held, np.where(held, np.minimum(np.maximum(solution, lower), upper), 0.0)
