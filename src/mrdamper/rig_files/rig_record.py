@@ -81,12 +81,11 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
         findings.append(Finding("W_SCALE", "the displacement is the integral of the velocity"))
     further = _further(table, assigned, size)
     stretches, cut = _tests_of(channels, profile)
-    findings += cut
+    findings += [*cut, *noted_columns(table, profile, assigned)]
     remarks = {**_remarks(table, profile, assigned), "time_from": rate}
     if len(stretches) == 1:
         remarks["motion_stated"] = stated_motion(stated_quantities(table.remarks, decimal=table.decimal))
     remarks = {key: text for key, text in remarks.items() if text}
-    findings += noted_columns(table, profile, assigned)
     rig = " ".join(name for name in (profile.rig, table.damper) if name) if table.damper != profile.rig else profile.rig
     records = []
     for number, stretch in enumerate(stretches, 1):
