@@ -591,6 +591,15 @@ def test_units_and_current_of_a_json_file_of_the_same_name(tmp_path):
     require_the_tests(tmp_path)
 
 
+def test_a_list_of_channels_names_columns_in_their_order(tmp_path):
+    write(tmp_path, "")
+    for name, amperes in CURRENTS.items():
+        (tmp_path / f"{name}.csv").rename(tmp_path / f"{name}_{amperes}A.csv")
+    channels = [{"name": name, "unit": unit} for name, unit in (("time", "s"), ("stroke", "mm"), ("load", "N"))]
+    (tmp_path / "meta.json").write_text(json.dumps({"channels": channels}))
+    require_the_tests(tmp_path)
+
+
 def test_the_frequency_in_a_description_of_a_folder_is_not_that_of_every_record(tmp_path):
     write(tmp_path, "time_s,hub,force_N\n")
     says = {"frequency": {"value": 5, "unit": "Hz"}, "hub": {"unit": "mm"}, "force_N": {"unit": "N"}}

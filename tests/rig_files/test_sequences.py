@@ -71,6 +71,19 @@ def test_blocks_minutes_apart_are_tests_of_their_own(tmp_path):
     assert [float(np.mean(record.current)) for record in records] == pytest.approx([0.0, 0.2, 0.4])
 
 
+@pytest.mark.parametrize("titles", [("0.5 A", "1 A"), ("0.5 A, 1 Hz", "0.5 A, 2 Hz")])
+def test_blocks_whose_titles_state_other_conditions_are_tests_though_their_clock_goes_on(tmp_path, titles):
+    text = ""
+    for n, title in enumerate(titles):
+        samples = loop(2.0 if "2 Hz" in title else 1.0, 10.0, 300.0 + 200 * n, 5.0)
+        text += f"# {title}\ntime [s],displacement [mm],force [N]\n"
+        text += "".join(f"{t + 5 * n:.4f},{x:.5f},{f:.3f}\n" for t, x, f in samples)
+    (tmp_path / "rig.csv").write_text(text)
+    result = import_files([tmp_path])
+    assert not result.refusals
+    assert [record.current[0] for record in result.records] == [0.5, 1.0 if titles[1] == "1 A" else 0.5]
+
+
 def test_a_sampling_rate_that_contradicts_the_frequency_of_the_name_is_refused(tmp_path):
     samples = loop(1.0, 10.0, 300.0, 6.5)
     rows = "".join(f"{n};{x:.5f};{f:.3f}\n" for n, (_, x, f) in enumerate(samples))

@@ -255,7 +255,8 @@ def other_statement(record: Record, current: float, whence: str, where: str) -> 
     """Return the error for a stated current [A] that is another number than the one stated for the record, or None."""
     own = record.provenance.get("current_from", "")
     mean = float(np.mean(record.current)) if own and record.current is not None else current
-    return _two_statements(record, mean, current, whence, where) if conditions.states_other(mean, current) else None
+    other = contradicts(mean, current, conditions.WRITTEN)
+    return _two_statements(record, mean, current, whence, where) if other else None
 
 
 def _two_statements(record: Record, mean: float, current: float, whence: str, where: str) -> ColumnError:

@@ -19,8 +19,8 @@ from mrdamper.rig_files.column_names import sentences, words
 from mrdamper.rig_files.text.tokens import MONTHS
 
 LARGEST_STATED = 15.0  # [A]: more is no coil current of a damper but another number
-_AGREE_A, _AGREE = 0.05, 0.15  # a nominal and a measured current may differ by so much: [A], and of it
-_SAME_A, _SAME = 0.01, 0.02  # and two numbers written for one current
+_AGREE = 0.05, 0.15  # a nominal and a measured current may differ by so much: [A], and of it
+WRITTEN = 0.01, 0.02  # and two numbers written for one current
 (_IN_NAME,) = sentences("current_in_name")
 _BEHIND_DIGITS = re.compile(r"(?<![0-9])([0-9]|1[0-4])_([0-9]+)[ _]?A(?![A-Za-z0-9])")  # MRD-7_0A: 0 or 7.0 A
 _BEFORE = re.compile("([A-Za-z]+)[-_ =]?$")  # letters before a label
@@ -443,14 +443,9 @@ def _value(number: str, decimal: str | None) -> float | None:
     return float(number.replace(",", "."))
 
 
-def contradicts(one: float, other: float) -> bool:
+def contradicts(one: float, other: float, limits: tuple[float, float] = _AGREE) -> bool:
     """Tell if a nominal and a measured current [A] contradict; a dash before a number may be a sign or none."""
-    return abs(abs(one) - abs(other)) > _AGREE_A + _AGREE * min(abs(one), abs(other))
-
-
-def states_other(one: float, other: float) -> bool:
-    """Tell if two statements of a current [A] are of different numbers."""
-    return abs(abs(one) - abs(other)) > _SAME_A + _SAME * min(abs(one), abs(other))
+    return abs(abs(one) - abs(other)) > limits[0] + limits[1] * min(abs(one), abs(other))
 
 
 def day_in(text: str) -> tuple[str, str] | None:

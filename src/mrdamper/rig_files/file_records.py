@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import math
 import os
 import re
 import shutil
@@ -15,6 +14,9 @@ from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from typing import IO
 
+import numpy as np
+
+from mrdamper.data import Floats
 from mrdamper.data.temporary import temporary_folder
 from mrdamper.errors import ColumnError, CombinedError, InputError, listed, printable
 from mrdamper.rig_files.coil_current import as_data, ask_current_too, with_value_of_name
@@ -152,16 +154,15 @@ def headings_of(path: str | Path, profile: Profile) -> dict[int, Heading]:
     return ask_tables(path, both, {}, profile.file)
 
 
-def start_of(path: Path, profile: Profile) -> float:
-    """Return the first time [s] of a file, which may be damaged elsewhere; NaN where none can be read."""
+def clock_of(path: Path, profile: Profile) -> Floats:
+    """Return the clock [s] of a file, which may be damaged elsewhere; empty where none can be read."""
 
-    def first(tables: list[RawTable]) -> float:
+    def clock(tables: list[RawTable]) -> Floats:
         table = test_tables(tables, profile)[0]
-        clock = partly_assigned(table, profile).get("time")
-        values = table.try_read(clock.column) if clock else None
-        return clock.factor * float(values[clock.column][0]) if clock and values else math.nan
+        time = partly_assigned(table, profile).get("time")
+        return time.factor * table.read([time.column]).values[time.column] if time else np.empty(0)
 
-    return ask_tables(path, first, math.nan, profile.file)
+    return ask_tables(path, clock, np.empty(0), profile.file)
 
 
 def tables_of_tests(tables: list[RawTable], profile: Profile) -> tuple[list[RawTable], list[InputError]]:

@@ -53,7 +53,7 @@ def guess_profile(path: str | Path, profile: Profile | str | Path | None = None)
     """
     profile = profile_of(profile)
     with raw_tables(path, profile.file) as tables:
-        table, channels = _guess_channels(test_tables(described(tables, Path(path), profile), profile), profile)
+        table, channels = _guess_channels(tables, Path(path), profile)
     of_file = {key: value for key, value in table.form.items() if key != "sheet" or len(tables) == 1}  # tests in others
     form = {**of_file, **profile.file.model_dump(exclude_defaults=True)}
     if not any(table.names):
@@ -77,7 +77,7 @@ def preview(path: str | Path, profile: Profile | str | Path | None = None) -> di
     """
     profile = profile_of(profile)
     with raw_tables(path, profile.file) as tables:
-        table, channels = _guess_channels(test_tables(described(tables, Path(path), profile), profile), profile)
+        table, channels = _guess_channels(tables, Path(path), profile)
         cells = [_first_cells(table, column) for column in range(min(len(table.names), _MOST_SHOWN))]
         places = {
             name: {"column": _place(table, channel.column), "unit": channel.unit or "", "sign": channel.sign}
@@ -104,7 +104,8 @@ def _place(table: RawTable, column: str | int | None) -> int | None:
         return None if column is None else column_called(table, column, "a channel")
 
 
-def _guess_channels(tables: list[RawTable], profile: Profile) -> tuple[RawTable, dict[str, Channel]]:
+def _guess_channels(tables: list[RawTable], path: Path, profile: Profile) -> tuple[RawTable, dict[str, Channel]]:
+    tables = test_tables(described(tables, path, profile), profile)
     try:
         table = tables_of_tests(tables, profile)[0][0]
         places = {name: (entry.column, entry.unit) for name, entry in assign(table, profile).items()}

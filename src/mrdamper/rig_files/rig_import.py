@@ -20,7 +20,7 @@ from mrdamper.data.progress import Progress, silent
 from mrdamper.data.temporary import without_temporary_folder
 from mrdamper.errors import ColumnError, CombinedError, InputError, is_a, shown, validate_arguments
 from mrdamper.rig_files import coil_current
-from mrdamper.rig_files.file_records import files_in, headings_of, records_of_file, start_of, unpacked
+from mrdamper.rig_files.file_records import clock_of, files_in, headings_of, records_of_file, unpacked
 from mrdamper.rig_files.mapping import plans
 from mrdamper.rig_files.mapping.companions import holds_channels, is_helper, is_list, joined_files, number_of, part_of
 from mrdamper.rig_files.mapping.comparisons import contradictions, in_another_unit, repeated, stated_as_amplitudes
@@ -206,7 +206,7 @@ class _Intake:
         records, refusals = _unchecked(path, profile)
         if refusals and self._parts and is_next(self._parts[-1][0], path):
             records, refusals = self._without_heading(path, profile) or (records, refusals)
-            if refusals and clock_goes_on(self._parts[-1][1][-1], start_of(path, profile)):
+            if refusals and clock_goes_on(self._parts[-1][1][-1].time, clock_of(path, profile)):
                 self._refuse_parts(path, refusals[0].error)
         self.met += [] if records else [(path, "")]
         no_table = not records and not given and [type(refusal.error) for refusal in refusals] == [NoTableError]
@@ -307,7 +307,7 @@ class _Intake:
                 self.notes += [refusal for refusal in self.refusals if Path(refusal.file) == path][:1]
                 self._drop_refusals({path})
         for path in [path for path, of in whence.items() if of.startswith(WITHIN)]:
-            self._compare(path, plans.results_of(path, self._profile.file))
+            self._compare(path, plans.results_of(path))
         if self._table and (windows := plans.remarks_of(self._table.path)):
             tests = self.tests()
             self._cut(self._table.path, windows, [tests[i] for i in plans.named_tests(windows, tests)])

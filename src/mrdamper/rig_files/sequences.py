@@ -100,14 +100,14 @@ def is_next(last: Path, path: Path) -> bool:
     return bool(old and new and named and int(new["n"]) == int(old["n"]) + 1)
 
 
-def clock_goes_on(record: Record, start: float) -> bool:
-    """Tell if a time [s] is that of the sample after the last of a record."""
-    return 0 < _steps_to(record, start) <= _MOST_STEPS
+def clock_goes_on(time: Floats, other: Floats) -> bool:
+    """Tell if a clock [s] begins where another ends."""
+    return 0 < _steps_between(time, other) <= _MOST_STEPS
 
 
 def _continues(one: Record, other: Record) -> bool:
     """Tell if the clock and the motion of a record go on in another, of the same channels."""
-    if one.channels.keys() != other.channels.keys() or not 0 < _steps_between(one, other) <= _MOST_STEPS:
+    if one.channels.keys() != other.channels.keys() or not clock_goes_on(one.time, other.time):
         return False
     leap = abs(other.displacement[0] - one.displacement[-1])
     return bool(leap <= 2 * _MOST_STEPS * max(np.nanmax(np.abs(np.diff(r.displacement))) for r in (one, other)))
@@ -156,21 +156,16 @@ def _concatenated(records: Sequence[Record]) -> Record:
     return replace(records[0], findings=tuple(findings), lines=lines, further=further, doubt=doubt, **channels)  # type: ignore[arg-type]
 
 
-def _steps_between(one: Record, other: Record) -> float:
-    """Return the time from the last sample of a record to the first of another, in steps of the first."""
-    start = other.time[np.isfinite(other.time)][:1]
-    return _steps_to(one, float(start[0])) if start.size else 0.0
-
-
-def _steps_to(record: Record, start: float) -> float:
-    time = record.time[np.isfinite(record.time)]
+def _steps_between(time: Floats, other: Floats) -> float:
+    """Return the time from the last stamp of a clock to the first of another, in steps of the first."""
+    time, start = time[np.isfinite(time)], other[np.isfinite(other)][:1]
     step = float(np.median(np.diff(time))) if time.size > 1 else 0.0
-    return float(start - time[-1]) / step if step > 0 else 0.0
+    return float(start[0] - time[-1]) / step if start.size and step > 0 else 0.0
 
 
 def _gap(one: Record, other: Record) -> float:
     """Return the time between two blocks as a share of that in which a recorder is off; infinite if time goes back."""
-    steps = _steps_between(one, other)
+    steps = _steps_between(one.time, other.time)
     seconds = float(np.nanmin(other.time) - np.nanmax(one.time)) if steps > 0 else np.inf
     return min(seconds / OFF_S, steps / OFF_STEPS) if steps > 0 else np.inf
 

@@ -81,10 +81,8 @@ def completed(table: RawTable) -> RawTable:
         own = unit.unit if header.role and unit.dimension == DIMENSION[header.role] else header.unit
         table = table.named({0: (header.name, own)}) if header.role else table
     table = _with_numbered_channels(_with_lines_of_file(_without_shared_path(table)))
-    if not any(table.names):
-        return table
-    table = _with_explained_names(table)
-    table = _with_titles(_with_heading_of_currents(_with_keyed_lines(table)))
+    table = _with_keyed_lines(_with_explained_names(table))
+    table = _with_titles(_with_heading_of_currents(table))
     table = _with_name_by_file(_with_listed_units(with_axis_as_time(table)))
     table = scales.with_stated_signs(_with_si_units(with_epoch(_with_clocks_and_weights(table))))
     return scales.with_sense(scales.with_scales(scales.with_counts(table)))
@@ -346,8 +344,6 @@ def _with_titles(table: RawTable) -> RawTable:
         if header.dimension == "time" and header.role not in ("time", None) and len(header.name) <= 2:
             names[i] = f"{split_name(title).name} time" if title else "time"
             units[i] = units[i] or header.unit
-        elif title and header.role is None and header.dimension == "voltage" and scales.scales_in(title):
-            names[i], units[i] = scales.SCALE.sub("", title).strip(" ,;:@-_/()[]"), header.unit
         elif title and header.role is None and (bare := split_name(without_currents(title))).role is not None:
             if header.dimension == "time" and bare.role != "time":
                 names[i], units[i] = f"{bare.name} time", units[i] or header.unit  # an x column of its own

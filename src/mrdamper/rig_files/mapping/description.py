@@ -344,9 +344,6 @@ def _head_in_yaml(lines: Iterable[str]) -> list[str]:
 def _stated(node: Any, key: str, units: Mapping[str, Any] | None = None, depth: int = 0) -> Iterator[str]:
     """Yield what a node states as lines: "current: 400 mA", "x; displacement; mm", "time: s", rows of a table."""
     units = units or {}
-    if isinstance(node, list) and all(isinstance(item, dict) and len(item) == 1 for item in node):  # an ordered map
-        joined = {key: value for item in node for key, value in item.items()}
-        node = joined if len(joined) == len(node) else node
     if isinstance(node, list) and len(node) >= _FEWEST_TESTS and all(isinstance(item, dict) for item in node):
         kinds: dict[tuple[str, ...], list[Any]] = {}
         for item in node:

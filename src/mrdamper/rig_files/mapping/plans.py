@@ -19,9 +19,9 @@ from mrdamper.rig_files.mapping.comparisons import forces_grow
 from mrdamper.rig_files.mapping.completion import completed
 from mrdamper.rig_files.mapping.description import SHORT_TEXTS, short_lines, with_notes
 from mrdamper.rig_files.mapping.name_schemes import Tests, by_example, by_legend, by_scheme, fields_of_names
-from mrdamper.rig_files.mapping.result_tables import lines_of, results_among, results_in
+from mrdamper.rig_files.mapping.result_tables import lines_of, results_in
 from mrdamper.rig_files.mapping.results import Results, rows_below_heads
-from mrdamper.rig_files.profile import FileForm, Profile, toml
+from mrdamper.rig_files.profile import Profile, toml
 from mrdamper.rig_files.quality.motion import moves
 from mrdamper.rig_files.quality.view import View, strokes_of
 from mrdamper.rig_files.readers import ask_tables, raw_tables
@@ -48,10 +48,8 @@ _STAMP = re.compile(  # 20190603_140512, 2019-06-03T14:05:12
 )
 
 
-def results_of(path: Path, form: FileForm | None = None) -> Results | None:
-    """Return the table of results that a file holds, or of a form beside its tests; None if it holds none."""
-    if form is not None:
-        return ask_tables(path, lambda tables: results_among(tables)[0], None, form)
+def results_of(path: Path) -> Results | None:
+    """Return the table of results that a file holds; None if it holds none."""
     if path.suffix.lower() in SHORT_TEXTS and (stated := results_in(short_lines(path))):
         return stated
 

@@ -297,7 +297,6 @@ def _parameters(items: list[Any]) -> dict[str, dict[str, Any]]:
         row = any(isinstance(v, float) and split_name(key).role for key, v in lower.items())
         if len(names) == 1 and value is not None and not row:
             others = [text for text in texts.values() if text != names[0] and RATING.search(text)]
-            value = re.sub(r"^([+-]?)(?=[.,][0-9])", r"\g<1>0", value) if isinstance(value, str) else value  # .5
             parameters[" ".join([names[0], *others])] = {"value": value, "unit": _stated(lower, KEYS["unit"], str)}
     some = any(isinstance(item["value"], float) or CELL.fullmatch(item["value"]) for item in parameters.values())
     return parameters if some and len(parameters) == len(items) else {}
@@ -367,7 +366,6 @@ def _channel(key: str, says: Mapping[str, Any], lists: list[list[str]]) -> list[
     if time is None or time.size != max(data.shape):
         return columns
     clock = _unit_of(lower, KEYS["time_unit"], "timeinfo") or ("s" if "timeinfo" in lower else "")
-    clock = {"seconds": "s", "milliseconds": "ms"}.get(clock, clock)
     return [_Column("time", clock, time, name), *columns]
 
 
