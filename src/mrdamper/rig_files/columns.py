@@ -193,11 +193,8 @@ def coil_currents(table: RawTable) -> list[int]:
     names = {i: table.headers[i].name for i in columns}
     ends = {i: ["", *words_of(name)][-1].upper() for i, name in names.items()}
     motors = frozenset().union(*(of for of in _PHASES if len(of & {*ends.values()}) > 1))
-    return [
-        i
-        for i, n in names.items()
-        if ends[i] not in motors and (column_names.role_of(n) == "current" or column_names.says_nothing(n))
-    ]
+    named = [i for i, n in names.items() if column_names.role_of(n) == "current" or column_names.says_nothing(n)]
+    return [i for i in named if ends[i] not in motors]
 
 
 def propose(table: RawTable) -> dict[str, tuple[int | None, str]]:
@@ -230,11 +227,8 @@ def _choose(table: RawTable, role: str, taken: Collection[int]) -> int | None:
         if role not in (*REQUIRED, "current"):
             return None
         # Without a telling name the unit decides, if it is the only one of its kind.
-        fitting = [
-            i
-            for i, h in enumerate(headers)
-            if h.dimension == DIMENSION[role] and not column_names.names_command(h.name)
-        ]
+        fitting = table.columns(dimension=DIMENSION[role])
+        fitting = [i for i in fitting if not column_names.names_command(headers[i].name)]
         free = [i for i in fitting if i not in taken and column_names.says_nothing(headers[i].name)]
         return free[0] if len(free) == 1 == len(fitting) else None
     candidates = fitting or named

@@ -262,9 +262,8 @@ def stated_by_lines(lines: Iterable[str], decimal: str | None = None) -> list[St
     lines, currents, rated = list(lines), [], []
     for line in lines:
         for key, value, unit in _quantities(line, decimal):
-            coil = column_names.names_condition(key, "current") or (
-                column_names.holds(key, column_names.COIL) and not column_names.RATING.search(key)
-            )
+            coil = column_names.holds(key, column_names.COIL) and not column_names.RATING.search(key)
+            coil = coil or column_names.names_condition(key, "current")
             if unit.dimension == "current" and re.search("rated", key, re.IGNORECASE):
                 rated.append(value)
             elif unit.dimension == "current" and coil and not _SCALE.search(line):

@@ -30,17 +30,7 @@ from mrdamper.rig_files.mapping.rasters import with_joined_rasters, with_one_clo
 from mrdamper.rig_files.mapping.result_tables import form_of_tests, with_results
 from mrdamper.rig_files.parts import tests_of, with_channels_as_columns
 from mrdamper.rig_files.profile import Profile, profile_hash, toml
-from mrdamper.rig_files.readers import ask_tables, raw_tables, suffixes
-from mrdamper.rig_files.readers.archive import (
-    UNREADABLE_ZIP,
-    as_it_is,
-    bomb,
-    check_member,
-    files_among,
-    is_junk,
-    opened,
-    zip_members,
-)
+from mrdamper.rig_files.readers import archive, ask_tables, raw_tables, suffixes
 from mrdamper.rig_files.readers.base import MOST_RATIO, MOST_UNPACKED, Content, RawTable, RigFileError, Source
 from mrdamper.rig_files.record import REQUIRED, Finding, Record
 from mrdamper.rig_files.rig_record import records_of
@@ -222,7 +212,7 @@ def unpacked(paths: Iterable[str | Path]) -> Iterator[list[Path]]:
         for path in map(Path, paths):
             members += [_folder_of(path, stack)] if _is_packed_folder(path) else [path]
             inside = sorted(path.rglob("*")) if path.is_dir() else ()
-            members += [_folder_of(archive, stack) for archive in inside if _is_packed_folder(archive)]
+            members += [_folder_of(file, stack) for file in inside if _is_packed_folder(file)]
         stack.callback(READ_FOLDERS.reset, READ_FOLDERS.set(members))
         yield members
 
@@ -276,9 +266,9 @@ def _is_packed_folder(path: Path) -> bool:
     if not name.endswith(".zip"):
         return False
     try:
-        with zipfile.ZipFile(path) as archive:
-            return len(files_among(archive.infolist())) > 1
-    except UNREADABLE_ZIP:
+        with zipfile.ZipFile(path) as packed:
+            return len(archive.files_among(packed.infolist())) > 1
+    except archive.UNREADABLE_ZIP:
         return False
 
 
@@ -286,24 +276,24 @@ def _folder_of(path: Path, stack: contextlib.ExitStack) -> Path:
     top = stack.enter_context(temporary_folder()) / path.name
     top.mkdir()
     if path.suffix.lower() == ".zip":
-        with as_it_is(path) as source:
+        with archive.as_it_is(path) as source:
             _unzip(source, top)
     else:
-        with opened(path, folder=True) as source:
+        with archive.opened(path, folder=True) as source:
             _untar(source, top)
     inside = list(top.iterdir())
     return inside[0] if len(inside) == 1 and inside[0].is_dir() else top
 
 
 def _unzip(source: Source, top: Path) -> None:
-    with zip_members(source) as (archive, members):
-        _fill(source, top, ((member.filename, archive.open(member)) for member in members))
+    with archive.zip_members(source) as (packed, members):
+        _fill(source, top, ((member.filename, packed.open(member)) for member in members))
 
 
 def _untar(source: Source, top: Path) -> None:
     try:
-        with tarfile.open(fileobj=source.file, mode="r:") as archive:
-            _fill(source, top, _files_of(source, archive))
+        with tarfile.open(fileobj=source.file, mode="r:") as packed:
+            _fill(source, top, _files_of(source, packed))
     except RigFileError:
         raise
     except (tarfile.TarError, OSError, ValueError, EOFError) as error:
@@ -311,11 +301,11 @@ def _untar(source: Source, top: Path) -> None:
         raise source.refuse(code, f"damaged archive ({error})", "copy or pack it again") from error
 
 
-def _files_of(source: Source, archive: tarfile.TarFile) -> Iterator[tuple[str, IO[bytes]]]:
+def _files_of(source: Source, packed: tarfile.TarFile) -> Iterator[tuple[str, IO[bytes]]]:
     """Yield the names and contents of the files in a tar; refuse links, and names that lead out of it."""
-    for member in archive:
-        check_member(source, member.name, link=not (member.isfile() or member.isdir()))
-        stream = archive.extractfile(member) if member.isfile() and not is_junk(member.name) else None
+    for member in packed:
+        archive.check_member(source, member.name, link=not (member.isfile() or member.isdir()))
+        stream = packed.extractfile(member) if member.isfile() and not archive.is_junk(member.name) else None
         if stream is not None:
             yield member.name, stream
 
@@ -337,7 +327,7 @@ def _fill(source: Source, top: Path, members: Iterable[tuple[str, IO[bytes]]]) -
                 while piece := stream.read(_PIECE):
                     left -= len(piece)
                     if left < 0:
-                        raise bomb(source)
+                        raise archive.bomb(source)
                     file.write(piece)
         except OSError as error:
             if shutil.disk_usage(top).free < _PIECE:

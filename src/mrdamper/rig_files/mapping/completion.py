@@ -100,9 +100,8 @@ def states_si(line: str) -> bool:
     """Tell if a line states that all units are those of the SI: All quantities in SI units."""
     if len(line) > LONGEST_LINE or not _SI_UNITS.search(line) or _EXCEPT.search(line):
         return False
-    named = [
-        column_names.parse_unit(word) for word in re.split(r"[\s,;:()\[\]=]+", line) if word != "in" and is_unit(word)
-    ]
+    words_of_line = re.split(r"[\s,;:()\[\]=]+", line)
+    named = [column_names.parse_unit(word) for word in words_of_line if word != "in" and is_unit(word)]
     return all(unit is None or unit.factor == 1 for unit in named)
 
 
@@ -394,11 +393,8 @@ def _with_listed_units(table: RawTable) -> RawTable:
             if i is None or row or not fits or value:
                 continue
             headings = " ".join(part.partition(": ")[0] for part in (line, whole))
-            doubt = (
-                column_names.RATING.search(f"{headings} {meaning}")
-                or _FIGURE.search(line)
-                or re.search("[0-9]", meaning)
-            )
+            doubt = _FIGURE.search(line) or re.search("[0-9]", meaning)
+            doubt = doubt or column_names.RATING.search(f"{headings} {meaning}")
             (doubtful if doubt else behind).setdefault(i, set()).add(header.unit)
             units = {unit for cell in cells if is_unit(unit := _ASIDE.sub("", cell))}  # kN (until 2020), N (since 2021)
             doubtful.setdefault(i, set()).update(u for u in units if split_name("", u).dimension == header.dimension)
@@ -440,12 +436,11 @@ def _with_clocks_and_weights(table: RawTable) -> RawTable:
     if not table.columns("time") and len(clocks) == len(table.columns("displacement", "length")) > 1:  # x_Run1 in s
         headings = {i: (_SYMBOL.sub("time", table.names[i]), table.units[i]) for i in clocks}
     for i, header in enumerate(table.headers):
+        weighed = column_names.holds(header.name, column_names.WEIGHT)
         key = re.sub(r"[\s_()]+", " ", header.name.strip().casefold()).strip()
         if not header.unit and key in _CLOCKS and not (table.columns("time") and is_unit(key)):  # ms of a stamp
             headings[i] = "time", _CLOCKS[key]
-        elif (
-            header.role == "force" and header.unit in _WEIGHTS and column_names.holds(header.name, column_names.WEIGHT)
-        ):
+        elif weighed and header.role == "force" and header.unit in _WEIGHTS:
             headings[i] = header.name, _WEIGHTS[header.unit]
             notes.append(Finding("W_UNITS", f"{header.name!r} in {header.unit} is the force of that weight"))
     return table.named(headings).noted(*notes)

@@ -91,12 +91,8 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     texts = [p for p in {*texts} if p.is_file() and p != path and not profile.leaves_out(*p.parts)]
     lines = [line for text in sorted(texts) if len(own := short_lines(text)) <= _MOST for line in own]
     names = {header.name.casefold() for header in table.headers}
-    about = [
-        scales.states_sign,
-        partial(scales.counts_in, names=names),
-        units_in,
-        partial(said_of_file, name=path.name),
-    ]
+    counts, of_file = partial(scales.counts_in, names=names), partial(said_of_file, name=path.name)
+    about = [scales.states_sign, counts, units_in, of_file]
     # A current may be that of one test, or an example.
     lines = [line for line in lines if not (stated_by_lines([line], ".") or stated_in_titles([line]))]
     stated = [(lacking and _of_channels(line)) or line * any(tells(line) for tells in about) for line in lines]

@@ -81,9 +81,8 @@ def by_scheme(lines: Sequence[str], results: Results | None, tests: Tests) -> li
         numbers = [conditions.amperes(number, "") for number in numbers if _SCHEME_NUMBER.fullmatch(number)]
         at = [i for i, key in enumerate(results.keys if results else ()) if header.name and key == header.name]
         rows = zip(results.cells, results.current, strict=True) if results and len(at) == 1 else ()
-        by_number = {
-            conditions.amperes(m[0], ""): of for cells, of in rows if (m := _SCHEME_NUMBER.match(cells[at[0]]))
-        }
+        matches = [(_SCHEME_NUMBER.match(cells[at[0]]), of) for cells, of in rows]
+        by_number = {conditions.amperes(match[0], ""): of for match, of in matches if match}
         if header.dimension == "current" and names_condition(header.name, "current"):
             by_number = {number: header.factor * number for number in numbers}
         if len(numbers) == len(tests) and {*numbers} <= {*by_number}:

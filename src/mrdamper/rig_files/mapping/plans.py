@@ -214,13 +214,9 @@ def discarded_tests(path: Path, results: Results | None, tests: Tests) -> dict[i
     names = last_parts(parts)
     left_out = toml([names[parts[i]] for i in refused])
     remedy = f"set [file] leave_out = {left_out} in a profile, or correct the remark if a test is valid"
-    problem = "{} has the remark {!r} on this test"
-    return {
-        i: QualityError(
-            printable(problem.format(path.name, text[:80])), where=files[i].name, remedy=remedy, code="E_DISCARDED"
-        )
-        for i, text in refused.items()
-    }
+    problems = {i: printable(f"{path.name} has the remark {of[:80]!r} on this test") for i, of in refused.items()}
+    where = {i: files[i].name for i in refused}
+    return {i: QualityError(of, where=where[i], remedy=remedy, code="E_DISCARDED") for i, of in problems.items()}
 
 
 def _discards(heading: str, cell: str) -> bool:

@@ -96,9 +96,8 @@ class _Walk:
             references = np.reshape(item[()], -1) if _is_matlab(item) else []
             cells = [self._at(item.file, r, depth) for r in references] if len(references) <= MOST_STRUCTS else []
             rows = [cells[row :: item.shape[-1]] for row in range(item.shape[-1] if cells and item.ndim == 2 else 0)]
-            grid = min(item.shape) > 1 and all(
-                isinstance(cell, arrays.Stored) for cell in cells
-            )  # of tests by two conditions
+            stored = all(isinstance(cell, arrays.Stored) for cell in cells)
+            grid = stored and min(item.shape) > 1  # of tests by two conditions
             return {name: arrays.with_headings(rows) or (rows if grid else cells) or np.empty(2, dtype=object)}
         unit = arrays.unit_in(item.attrs)
         kind = getattr(h5py.check_vlen_dtype(item.dtype), "kind", "")  # of vectors of samples
@@ -110,13 +109,11 @@ class _Walk:
             return {stated: value} if value is not None else {}
         attributes = _attributes(item)
         lists = {f"{name} {key}": words for key, words in attributes.items() if isinstance(words, list)}
-        if item.dtype.names:  # a table of records states its conditions itself
-            units = next((w for w in lists.values() if len(w) == len(item.dtype.names) and any(map(is_unit, w))), None)
-            fields: dict[str, Any] = {
-                field: arrays.Stored(item.shape, item.dtype[field], lambda field=field: item[field])
-                for field in item.dtype.names
-            }
-            fields |= {"units": dict(zip(item.dtype.names, units, strict=True))} if units else {}
+        if names := item.dtype.names:  # a table of records states its conditions itself
+            units = next((w for w in lists.values() if len(w) == len(names) and any(map(is_unit, w))), None)
+            kinds, fields = item.dtype, dict[str, Any]()
+            fields |= {of: arrays.Stored(item.shape, kinds[of], lambda of=of: item[of]) for of in names}
+            fields |= {"units": dict(zip(names, units, strict=True))} if units else {}
             return attributes | fields if alone else {name: attributes | fields}
         numbers = {key: number for key, number in attributes.items() if isinstance(number, float)}
         packed = item.dtype.kind in "iu" and arrays.counts_of(item.attrs) is None
