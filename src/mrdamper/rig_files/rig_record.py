@@ -89,8 +89,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
     rig = " ".join(name for name in (profile.rig, table.damper) if name) if table.damper != profile.rig else profile.rig
     records = []
     for number, stretch in enumerate(stretches, 1):
-        part = {name: values[stretch] for name, values in channels.items()}
-        others = {name: values[stretch] for name, values in further.items()}
+        part, others = ({name: values[stretch] for name, values in of.items()} for of in (channels, further))
         part, its_lines = _aligned(part, assigned, None if lines is None else lines[stretch])
         if its_lines is not None and len(its_lines) != stretch.stop - stretch.start:
             others = {}  # delays were subtracted: the samples are no longer those of the file
