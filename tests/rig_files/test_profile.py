@@ -276,6 +276,16 @@ def test_the_guess_of_a_file_that_says_too_little_is_there_to_be_completed(tmp_p
     np.testing.assert_allclose(record.force, channels()["force"], rtol=0, atol=1e-6)
 
 
+def test_files_with_the_same_signals_in_folders_are_a_test_each(tmp_path):
+    for folder, amperes in (("0 A", 0), ("0.5 A", 1)):
+        (tmp_path / folder).mkdir()
+        for name in ("1 Hz.csv", "2 Hz.csv"):
+            write(tmp_path / folder, name, text(rows(seed=amperes), ("Time (s),Channel A (V),Channel B (V)",)))
+    written, problems = profile_template([tmp_path], Profile())
+    assert len(problems) == 2
+    assert "{run}" not in written.partition("# pattern")[0]
+
+
 @pytest.mark.parametrize(("name", "pattern"), [("run_{}/{}.csv", "{{run}}/{}.csv"), ("{1}_{0}.csv", "{}_{{run}}.csv")])
 def test_a_profile_is_written_for_tests_of_several_files(name, pattern, tmp_path):
     for number in (1, 2):

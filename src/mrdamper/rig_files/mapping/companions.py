@@ -207,8 +207,9 @@ def files_by_kind(files: Sequence[Path], profile: Profile) -> dict[str, Path]:
         kinds = _kinds(files, in_folders)
         if 1 < len(kinds) <= _MOST_KINDS and len(set.intersection(*map(set, kinds.values()))) > 1:
             first = {pattern: next(iter(of.values())) for pattern, of in kinds.items()}
-            alike = len({tuple(headings_of(path, profile).values()) for path in first.values()}) == 1
-            return {} if alike and any(holds_channels(path, profile.file) for path in first.values()) else first
+            headings = {tuple(headings_of(path, profile).values()) for path in first.values()}
+            channels = [header for of in headings for _, header in of if header.role != "time"]
+            return {} if len(headings) == 1 < len(channels) else first
     return {}
 
 
