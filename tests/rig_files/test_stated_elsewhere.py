@@ -105,6 +105,13 @@ def test_channels_called_by_numbers_have_the_names_and_scales_that_a_line_gives_
     expect(tmp_path, 0.5)
 
 
+@pytest.mark.parametrize("aside", ["", " (a pull gives a negative voltage; the factor turns the sign)"])
+def test_a_negative_scale_turns_the_sign_once(tmp_path, aside):
+    table(tmp_path / "a_0.5A.csv", [f"# Load: -200 N/V{aside}", "time_s,stroke_mm,Load [V]"], T, X, -force(0.5) / 200)
+    expect(tmp_path, 0.5)
+    assert "sign_changed" not in import_files([tmp_path]).records[0].provenance
+
+
 def test_counts_have_the_scale_that_a_line_gives_one_of_them(tmp_path):
     head = ["# encoder: 1 count = 5 um", "# load cell: 200 N/V", "time_s,encoder_counts,loadcell_V"]
     table(tmp_path / "test_0.5A.csv", head, T, 200 * X, force(0.5) / 200)

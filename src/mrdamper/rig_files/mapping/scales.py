@@ -20,7 +20,7 @@ from mrdamper.rig_files.record import SIGNED, Finding
 _MONITOR = words("monitor")
 _AROUND = r"(?:\+ ?/? ?[-−–]|±) ?"  # zero
 SCALE = re.compile(
-    rf"(?P<around>{_AROUND})?(?<![\w.,])(?P<one>[0-9]+(?:[.,][0-9]+)?)\s*(?P<unit>[A-Za-zµ]{{1,6}}|%)"
+    rf"(?P<around>{_AROUND})?(?P<minus>(?<![\w.,)])[-−])?(?<![\w.,])(?P<one>[0-9]+(?:[.,][0-9]+)?)\s*(?P<unit>[A-Za-zµ]{{1,6}}|%)"
     r"(?:\s*(?:PWM|duty(?: cycle)?|drive|output))?\s*(?:/|=|per|pro|entspricht|->)\s*"
     rf"(?(around)(?:{_AROUND})?)(?P<other>[0-9]+(?:[.,][0-9]+)?)?\s*(?P<volt>[A-Za-zµ]{{1,6}}|%)(?![A-Za-z0-9/])"
 )
@@ -196,9 +196,10 @@ def scales_in(line: str) -> list[tuple[str, str, float]]:
         if not left or not right:
             continue
         if other.dimension in _SIGNALS:
-            scales.append((_CHANNELS.get(one.dimension, ""), match["unit"], left / (right * other.factor)))
+            scale = _CHANNELS.get(one.dimension, ""), match["unit"], left / (right * other.factor)
         else:
-            scales.append((_CHANNELS.get(other.dimension, ""), match["volt"], right / (left * one.factor)))
+            scale = _CHANNELS.get(other.dimension, ""), match["volt"], right / (left * one.factor)
+        scales.append((*scale[:2], -scale[2]) if match["minus"] and scale[0] in SIGNED else scale)
     return scales
 
 
@@ -245,7 +246,7 @@ def with_stated_signs(table: RawTable) -> RawTable:
     about the sign leaves it unclear, as a clause does whose sense is none of the words known.
     """
     stated: dict[str, set[int]] = {}
-    for whole in table.lines:
+    for whole in (line for line in table.lines if not any(factor < 0 for *_, factor in scales_in(line))):
         counted, clauses = senses_in(whole), _CLAUSE.split(whole)
         each = [clause for clause in clauses if _signs(_POLARITIES, clause)]
         apart = len(each) > 1 and all(_named(clause) & {*SIGNED} for clause in each) and counted
