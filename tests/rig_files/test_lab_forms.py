@@ -53,7 +53,15 @@ DUTIES = "| duty | current |\n|---|---|\n| 0 % | 0 A |\n| 50 % | 1.1 A |"
         (["m_A5_I0,00", "m_A5_I1,20"], "Dateinamen: m_A<Amplitude in mm>_I<Spulenstrom in A>.csv", [0.0, 1.2]),
         (["m_000", "m_500"], "names: m_<coil current [mA]>", [0.0, 0.5]),
         (["m_0", "m_2"], "names: m_<current>", []),
-        (["m_c00", "m_c05"], "m_cCC.csv\n`cCC`: coil current in tenths of an ampere (c05 = 0.5 A)", [0.0, 0.5]),
+        *(
+            (["m_c00", "m_c05"], f"m_cCC.csv\n`cCC`: coil current {meaning}", stated)
+            for meaning, stated in (
+                ("in tenths of an ampere (c05 = 0.5 A)", [0.0, 0.5]), ("x 0.1 A", [0.0, 0.5]),
+                ("2 in A", []), ("max 2 A", []),
+                ("in tenths of an ampere (e.g. c05 is 0.5 A)", [0.0, 0.5]),
+                ("in tenths of an ampere, i.e. 05 = 0.5 A", [0.0, 0.5]),
+            )
+        ),
         (["m_0000_1", "m_0500_2"], "File names: m_iiii_f.csv\n  iiii  coil current in mA\n  f  frequency", [0.0, 0.5]),
         (["m_0000_1", "m_0500_2"], "File names: m_iiii_f.csv\n  iiii  number\n  f  coil current", []),
         (["0_2", "0.5_2"], "A name is *current_frequency* with current in A, frequency in Hz", [0.0, 0.5]),

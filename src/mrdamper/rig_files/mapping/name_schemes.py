@@ -25,7 +25,10 @@ _PLACE = re.compile(r"[\s*`-]*([^\W\d_]{1,12})`?(?:\s*[=:]|\s+[-–]\s|\s{2,})\s
 _NAME_IN_UNIT = re.compile(r"\b([^\W\d_]{3,})\s+(?:(?:is|are)\s+)?in\s+([^\W\d_]{1,3})\b")
 _SHARES = {"d": "tenths?|zehntel|dixièmes?", "c": "hundredths?|hundertstel|centièmes?", "m": "thousandths?|tausendstel"}
 _NUMBERS = re.compile(r"[\W\d_]*")
-_IN_EXAMPLE = re.compile(r"\s*\([A-Za-z]+[0-9]\w*\s*=[^()]*\)")  # (c05 = 0.5 A)
+_IN_EXAMPLE = re.compile(  # (c05 = 0.5 A); , e.g. 05 = 0.5 A
+    r"\s*\([^()]*\b[A-Za-z]*[0-9][^()]*\)|\s*[,;]\s*(?:i\.\s?e\.|e\.\s?g\.|z\.\s?b\.|d\.\s?h\.|p\.\s?ex\.).*", re.I
+)
+_TIMES = re.compile(r"(?P<name>.*?)(?:\s+x|\s*[×*·])\s*(?P<factor>[0-9]+(?:[.,][0-9]+)?)")  # coil current x 0.1, of A
 _SCHEME_NUMBER = re.compile(r"[0-9]+(?:[.,xp][0-9]+)?")
 _CODE = re.compile(r"([A-Za-z]{1,6})([0-9]{1,3})(?:\s*(?:-|–|to|bis)\s*\1([0-9]{1,3}))?")  # I1 or test01-test04
 
@@ -83,8 +86,11 @@ def by_scheme(lines: Sequence[str], results: Results | None, tests: Tests) -> li
         rows = zip(results.cells, results.current, strict=True) if results and len(at) == 1 else ()
         matches = [(_SCHEME_NUMBER.match(cells[at[0]]), of) for cells, of in rows]
         by_number = {conditions.amperes(match[0], ""): of for match, of in matches if match}
-        if header.dimension == "current" and names_condition(header.name, "current"):
-            by_number = {number: header.factor * number for number in numbers}
+        times = _TIMES.fullmatch(header.name)
+        factor = header.factor * (conditions.amperes(times["factor"], "") if times else 1.0)
+        name = times["name"] if times else header.name
+        if header.dimension == "current" and names_condition(name, "current") and not name[-1:].isdigit():
+            by_number = {number: factor * number for number in numbers}
         if len(numbers) == len(tests) and {*numbers} <= {*by_number}:
             stated.add(tuple(by_number[number] for number in numbers))
     return [(current, "the names of files") for current in stated.pop()] if len(stated) == 1 else []
