@@ -82,10 +82,8 @@ def _missing_currents(refusals: Sequence[Refusal], columns: Mapping[int, str]) -
         lines = ["# Calibration of the current: A for 1 of the column:", "#[channels.current]", f"#column = {shown}"]
         lines += ['#unit = "A"', "#scale =", ""]
     runs = [r.run or Path(r.file).stem for r in missing]
-    names = [
-        escape(run) if runs.count(run) == 1 else "*/" + escape("/".join(Path(r.file).parts[-2:]).replace(": ", "/"))
-        for run, r in zip(runs, missing, strict=True)
-    ]
+    paths = [escape("/".join(Path(r.file).parts[-2:]).replace(": ", "/")) for r in missing]
+    names = [escape(run) if runs.count(run) == 1 else f"*/{path}" for run, path in zip(runs, paths, strict=True)]
     heading = '# Tests without a current: remove the #, write each current [A] behind its =, or "*" = ... for all:'
     lines += [heading, "#[current.values]"]
     whys = [f"  # {text}" if text and not text.startswith("no coil current") else "" for text in reasons]

@@ -79,10 +79,8 @@ def with_channels_by_physics(table: RawTable, stated: Mapping[str, str | int]) -
     """
     table = _with_choices(table)
     try:
-        open_roles = {
-            role: [column_called(table, stated[role], role)] if role in stated else candidates_of(table, role)
-            for role in REQUIRED
-        }
+        own = {role: [column_called(table, column, role)] for role, column in stated.items() if role in REQUIRED}
+        open_roles = {role: own.get(role) or candidates_of(table, role) for role in REQUIRED}
     except InputError:
         return table
     if all(len(columns) == 1 for columns in open_roles.values()) or not all(open_roles.values()):

@@ -36,11 +36,9 @@ class Mdf(Reader):
         sizes = (8 * channels[0]["data"].size for channels in groups.values() if channels)
         check_unpacked(source, max(sizes, default=0))
         notes = [getattr(group.channel_group, "comment", "") for group in file.groups]
-        tree = {
-            name: {"channels": channels, **({"comment": str(note)} if note else {})}
-            for (name, channels), note in zip(groups.items(), notes, strict=True)
-            if len(channels) > 1
-        }
+        texts = [{"comment": str(note)} if note else {} for note in notes]
+        both = zip(groups.items(), texts, strict=True)
+        tree = {name: {"channels": own, **text} for (name, own), text in both if len(own) > 1}
         return nested_tables(source, tree, self.title)
 
 
