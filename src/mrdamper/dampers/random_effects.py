@@ -147,7 +147,7 @@ class GainsAndOffsets:
         turned = np.linalg.solve(covariance, whole).astype(float, copy=False)
         inner: Floats = whole.T @ turned
         table = np.add.reduceat(np.add.reduceat(inner**2, first, axis=1), first, axis=2)
-        by_noise = np.add.reduceat(np.sum(turned * (own @ turned), axis=1), first, axis=1)
+        by_noise = np.add.reduceat(np.sum(turned * (own @ turned), axis=1), first, axis=1) if noise else 0.0
         forms = np.add.reduceat((shown[:, None, :] @ turned)[:, 0] ** 2, first, axis=1)
         size: Floats = np.sqrt(np.einsum("dcc->dc", table))
         table: Floats = table / size[:, :, None] / size[:, None, :]
