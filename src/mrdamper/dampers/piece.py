@@ -73,6 +73,7 @@ class Pieces:
             [rows + at for rows, at in zip(scored, self.begins, strict=True)]
         )
         self.force = np.concatenate([piece.force for piece in self.pieces])
+        self._channels: dict[str, Floats] = {}
         self._read: dict[tuple[str, ...], Channels] = {}
         self.scale = np.repeat([piece.scale for piece in self.pieces], [rows.size for rows in scored])
 
@@ -111,12 +112,14 @@ class Pieces:
 
     def _channel(self, name: str) -> Floats:
         """(N,) channel of the motions, or of the sine each of them is."""
-        sine = _SINE.get(name)
-        return np.concatenate(
-            [
-                channel(piece.motion, name)
-                if sine is None
-                else np.full(len(piece.motion), getattr(piece.condition, sine))
-                for piece in self.pieces
-            ]
-        )
+        if name not in self._channels:
+            sine = _SINE.get(name)
+            self._channels[name] = np.concatenate(
+                [
+                    channel(piece.motion, name)
+                    if sine is None
+                    else np.full(len(piece.motion), getattr(piece.condition, sine))
+                    for piece in self.pieces
+                ]
+            )
+        return self._channels[name]
