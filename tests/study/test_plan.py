@@ -351,6 +351,7 @@ def test_the_records_are_read_back(damper, tmp_path):
         assert np.ptp(run.displacement) / 2 == pytest.approx(1e-3 * float(row["amplitude_mm"]), rel=0.02)
         assert run.current_A == pytest.approx(float(row["current_A"]))
         assert float(row["minutes"]) > 3
+        assert float(row["standard_deviation_after"]) < float(row["standard_deviation_before"])
     read = CliRunner().invoke(
         application(),
         ["import", *(str(tmp_path / "next" / row["file"]) for row in listed), "--out", str(tmp_path / "d")],

@@ -129,7 +129,7 @@ class ExperimentDesign:
         names = (*uncertainty.names, *unknown)
         slopes_of_draws: list[Floats] = []
         for number, condition in enumerate(conditions):
-            progress(f"what test {number + 1} of {len(conditions)} would tell", 0.9 * number / len(conditions))
+            progress(f"information of test {number + 1} of {len(conditions)}", 0.9 * number / len(conditions))
             slopes_of_draws.append(_slopes(damper, uncertainty, names, condition))
         stacked = np.array(slopes_of_draws)  # (C, D, K, P + 2)
         doubt = stacked if not isinstance(about, Condition) else np.array([_slopes(damper, uncertainty, names, about)])

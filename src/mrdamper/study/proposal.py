@@ -43,7 +43,10 @@ class Proposal:
 
 @dataclass(frozen=True)
 class PlanRow:
-    """One row of plan.csv; the bands are in the unit of the quantity to be determined, empty without a model."""
+    """One row of plan.csv; empty standard deviations without a model.
+
+    They are those of the force over half its peak-to-peak value, or of the parameter over its value.
+    """
 
     order: int
     session: int
@@ -52,8 +55,8 @@ class PlanRow:
     frequency_Hz: float
     amplitude_mm: float
     minutes: float
-    band_before: float | None
-    band_after: float | None
+    standard_deviation_before: float | None
+    standard_deviation_after: float | None
     reason: str
 
     @classmethod

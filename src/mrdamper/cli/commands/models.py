@@ -30,20 +30,20 @@ def models(
     elif name:
         print(_page(chosen[0]))
     else:
-        print("\n".join(_line(model) for model in chosen))
+        print("\n".join(aligned([_cells(model) for model in chosen], (0, 1, 2))))
         print("\nmrdamper models NAME shows the equation, the parameters and the source.")
 
 
-def _line(model) -> str:
+def _cells(model) -> tuple[str, str, str]:
     if not hasattr(model, "parameters"):
         start = (
             f"parameter functions; starts from individual fits of {model.basis}"
             if model.basis
             else "regression without a physical model"
         )
-        return f"{model.name:18} {model.heading:30} {start}"
+        return model.name, model.heading, start
     free = [info.name for info in model.parameters() if not info.preset]
-    return f"{model.name:18} {model.title:30} {len(free):2} free: {' '.join(free)}"
+    return model.name, model.title, f"{len(free):2} free: {' '.join(free)}"
 
 
 def _page(model) -> str:

@@ -25,7 +25,7 @@ app = typer.Typer()
 def validate(
     model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
     data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests."),
-    rig: str | None = typer.Option(None, help="Use the runs of this rig instead."),
+    rig: str | None = typer.Option(None, help="Use the runs of this rig instead of the model's."),
     split: str | None = typer.Option(None, help="Only identification (train) or only validation (validate) runs."),
     check_run: list[str] = typer.Option([], help="Check run that corrects its session; may be repeated."),
     own_sessions: bool = typer.Option(
@@ -122,7 +122,8 @@ def _print_summary(
         if _chance(sum(inside), len(inside), level) < 0.01:
             note = ": the band does not hold for these runs, of another state or session of the damper, or another rig"
         typer.echo(
-            f"peak force inside its {100 * level:g} % band in {sum(inside)} of {len(inside)} runs{note}", err=True
+            f"peak force inside its {100 * level:g} % prediction interval in {sum(inside)} of {len(inside)} runs{note}",
+            err=True,
         )
     floors = [run.floor for run in validation.runs if run.floor is not None]
     outside = sum(bool(run.extrapolation) for run in validation.runs)
