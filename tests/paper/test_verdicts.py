@@ -88,6 +88,7 @@ def test_how_well_a_function_fits_says_nothing_by_itself():
         ("mass", "R² of m over current and frequency"), ("alpha", "R²"), ("beta", "R² of ln β"),
         ("beta", "share of runs at the limit of the box"),
         ("generalisation", "median validation error over the median error of identification"),
+        ("few parameters", "searched parameters a run over the Ali-type's"),
     }  # fmt: skip
     for key in ("mass", "alpha", "beta"):
         fits = numbers(key, lambda x: beyond(x, x.near) if x.alone else x.holds)
