@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from mrdamper.data import Run, hour_of, session_of
+from mrdamper.data.sessions import session_groups
 from mrdamper.errors import InputError
 
 
@@ -37,3 +38,8 @@ def test_a_clock_that_is_no_date_is_refused_where_it_is_needed():
         with pytest.raises(InputError, match="recorded_at is 'yesterday'") as caught:
             ask(recorded(recorded_at="yesterday"))
         assert caught.value.code == "E_CLOCK"
+
+
+def test_sessions_are_groups_of_runs_in_the_order_of_their_names():
+    assert session_groups(["b", "a", None, "c", "a"]) == [[1, 4], [0], [3]]
+    assert session_groups(["b", "a", None, "a"]) == []

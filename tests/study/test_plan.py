@@ -167,7 +167,7 @@ def test_a_plan_says_what_its_numbers_are(reckoning, damper):
     own = design(damper, "c1").proposals([[0], [1]])
     shown = f"standard error of c1 {100 * own[0].before:.1f} % -> {100 * own[-1].after:.1f} % of its value"
     assert design(damper, "c1").summary(own) == shown
-    wild = [replace(own[0], before=519.0), replace(own[-1], after=0.2)]
+    wild = [replace(own[0], before=1.5), replace(own[-1], after=0.2)]
     expected = "standard error of c1 over 100 % (not determined) -> 20.0 % of its value"
     assert design(damper, "c1").summary(wild) == expected
 
@@ -184,10 +184,16 @@ def test_a_plan_between_two_currents_tests_one_between_and_reduces_what_the_inte
     currents = [item.condition.current_A for item in made]
     assert {0.33, 0.67} & set(currents)
     reasons = [item.reason for item in made if 0 < item.condition.current_A < 1]
-    assert "model error between the tested currents falls to" in reasons[0]
+    rows = [
+        reckoning.conditions.index(item.condition) for item in made[: 1 + [i.reason for i in made].index(reasons[0])]
+    ]
+    share = np.sqrt(reckoning.by_distance(rows)[0] / reckoning.by_distance([])[0])
+    assert reasons[0] == f"model error between the tested currents falls to {100 * share:.0f} % of today's"
     # The variances are those of the interval, at the conditions of the grid and at currents between them.
     at = _with_currents_between(reckoning.conditions)
     assert {c.current_A for c in at} == {0.0, 0.165, 0.33, 0.5, 0.67, 0.835, 1.0}
+    few = [Condition(0.0, 1.0, 0.01), Condition(1.0, 1.0, 0.01), Condition(1.0, 2.0, 0.01)]
+    assert _with_currents_between(few) == [*few, Condition(0.5, 1.0, 0.01)]
     for rows in ([], [reckoning.conditions.index(item.condition) for item in made]):
         later = replace(known, envelope=known.envelope.with_tests([reckoning.conditions[i] for i in rows]))
         halves = [

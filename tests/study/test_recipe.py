@@ -85,6 +85,12 @@ def test_fitted_left_out_and_held_out_errors_stay_apart():
     assert wape == {"train": [0.0] * 4, "cross_validated": pytest.approx([1.0] * 4), "validation": pytest.approx([1.0])}
     assert [run.run_id for run in found.cross_validated.runs] == [run.id for run in TRAIN]
     assert [run.run_id for run in found.validation.runs] == ["held"]
+    errors = replace(found, validation=replace(found.validation, runs=())).errors
+    assert list(errors.items()) == [
+        ("per_run_nrmse_pp", 0.2), ("train_nrmse_pp", 0.0), ("cv_nrmse_pp", found.cross_validated.median()),
+        ("cv_worst_nrmse_pp", found.cross_validated.worst_error()),
+        ("validation_nrmse_pp", None), ("validation_worst_nrmse_pp", None),
+    ]  # fmt: skip
     assert found.per_run == 0.2
     assert 100.0 <= found.seconds < 110.0
     without = fit_and_score(REMEMBER, TRAIN, [], HELD, leave_out=False)
