@@ -190,7 +190,7 @@ def test_sessions_whose_forces_differ_by_more_than_their_runs_are_a_limitation()
     (offset,) = sentences(alike, offsets)
     assert "0.75 N in day1, 151 N in day2;" in offset
     (extremes,) = sentences(alike, alike, gains, alike, [(of - 0.1, n) for of, n in alike])
-    assert "0.9 in day5, 1.1 in day3;" in extremes
+    assert "0.9 in day5 to 1.1 in day3;" in extremes
     scattered = [(0.9, 0.0), (1.1, 0.0), (1.0, 0.0)]
     assert sentences(scattered, [(of + 0.05, n) for of, n in scattered]) == []
 

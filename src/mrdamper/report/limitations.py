@@ -192,10 +192,11 @@ def _sessions(runs: Iterable[Run], train: Validation) -> list[str]:
         scale = 1.0 if what == "gain" else float(np.median([one.pp for of in own for one in of]))
         by_chance = fdtrc(len(groups) - 1, more, between / (within or 1e-12))
         if by_chance < _CHANCE and np.ptp(means) > least * scale:
-            shown = range(len(names)) if len(names) <= _MAX_RUNS else (int(np.argmin(means)), int(np.argmax(means)))
+            all_shown = len(names) <= _MAX_RUNS
+            shown = range(len(names)) if all_shown else (int(np.argmin(means)), int(np.argmax(means)))
+            values = (", " if all_shown else " to ").join(f"{number(means[i], 3)}{unit} in {names[i]}" for i in shown)
             sentences.append(
-                f"Sessions differ in the {what} of measured over predicted force: "
-                f"{', '.join(f'{number(means[i], 3)}{unit} in {names[i]}' for i in shown)}; "
+                f"Sessions differ in the {what} of measured over predicted force: {values}; "
                 "check load cell, mounting, coil current and temperature of these sessions."
             )
     return sentences
