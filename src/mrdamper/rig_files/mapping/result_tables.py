@@ -31,7 +31,8 @@ _QUANTITY = re.compile(rf"({NUMBER.pattern})\s*(m?A)")
 WITHIN = "table of results"  # within the file of its tests: beginning of where their currents stand
 _RULE = re.compile(r"[-=+|:\s]{3,}")  # below the names of columns
 _SUPPLY = re.compile(r"(?i)\b(?:power[ _-]?)?suppl(?:y|ied)\b|\bpsu\b")
-_FEWEST_ROWS = _TELLING = 2
+_FEWEST_ROWS = 2  # of a table of results
+_FEWEST_CHANNELS = 2  # of a table of samples
 _MOST_ROWS, _MOST_COLUMNS = 2000, 60  # of a table of results
 _TO = r"\s*(?:[-–]|\.{2,3}|\b(?:to|bis|do|à|au|a|al|até|se)\b)\s*"
 _NUMBERS = re.compile(rf"([0-9]{{1,4}})(?:{_TO}([0-9]{{1,4}}))?")
@@ -156,7 +157,7 @@ def results_among(tables: Sequence[RawTable]) -> tuple[Results | None, Sequence[
         channels = {header.role or header.dimension for header in table.headers} - {None}
         if results is not None and not results.of_supply:
             stated.append(results)
-        elif not any(table.names) or len(channels) >= _TELLING:
+        elif not any(table.names) or len(channels) >= _FEWEST_CHANNELS:
             tests.append(table)
     stated = [results for results in stated if len(stated) == 1 or len(results.current) == len(tests)]  # no means
     return stated[0] if len(stated) == 1 else None, tests
