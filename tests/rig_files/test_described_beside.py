@@ -14,7 +14,7 @@ from mrdamper import import_files
 from mrdamper.rig_files import tests_table
 from mrdamper.rig_files.mapping import plans
 from mrdamper.rig_files.mapping.description import short_lines
-from mrdamper.rig_files.profile import Profile
+from mrdamper.rig_files.profile import Profile, parse_profile
 from mrdamper.rig_files.readers import raw_tables
 
 T = np.arange(1001) / 200.0
@@ -568,6 +568,38 @@ def test_ranges_of_sensors_do_not_name_columns_without_names(tmp_path):
     assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} == {"E_UNITS_MISSING"}
 
 
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("описание.txt", "Перемещение в см, сила в Н. Ток указан в имени файла.\n"),
+        ("README.txt", "All displacements are in cm and all forces in N.\n"),
+        ("opis.txt", "Przemieszczenie w cm, siła w N\n"), ("popis.txt", "Dráha: cm\n"),
+    ],
+)  # fmt: skip
+def test_a_unit_of_a_heading_that_notes_contradict_is_asked_about_in_any_language(tmp_path, name, text):
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    rows = "".join(f"{t:.3f},{x:.7f},{f:.6f}\n" for t, x, f in zip(T, X, force(0.5), strict=True))
+    (tmp_path / "a_0.5A.csv").write_text("time [s],displacement [mm],force [N]\n" + rows)
+    (refusal,) = import_files([tmp_path]).refusals
+    assert refusal.error.code == "E_AMBIGUOUS"
+    assert "is in mm by its heading and in c" in str(refusal.error).replace("см", "cm")
+    (record,) = import_files([tmp_path], parse_profile('[channels.displacement]\nunit = "cm"\n')).records
+    assert np.ptp(record.displacement) == pytest.approx(0.24, rel=1e-3)
+    assert [f.code for f in record.findings if "read in cm, as the profile states, not in its own mm" in f.text]
+
+
+def test_a_structure_beside_a_record_contradicts_the_unit_of_its_column(tmp_path):
+    for name, unit in (("a", "mm"), ("b", "cm")):
+        (tmp_path / name).mkdir()
+        rows = "".join(f"{t:.3f},{x:.7f},{f:.6f}\n" for t, x, f in zip(T, X, force(0.5), strict=True))
+        (tmp_path / name / "data_0.5A.csv").write_text("t_s,x_mm,F_N\n" + rows)
+        text = f"channels:\n  x: {{quantity: displacement, unit: {unit}, sensor: LVDT}}\n"
+        (tmp_path / name / "meta.yaml").write_text(text)
+    result = import_files([tmp_path])
+    assert [refusal.error.code for refusal in result.refusals] == ["E_AMBIGUOUS"]
+    assert len(result.records) == 1
+
+
 def test_fields_and_a_description_of_a_data_package(tmp_path):
     (tmp_path / "data").mkdir()
     write(tmp_path / "data", "t,u,f\n")
@@ -577,6 +609,10 @@ def test_fields_and_a_description_of_a_data_package(tmp_path):
         {"path": f"data/{n}.csv", "description": f"Coil current {a} A", "schema": {"fields": fields}}
         for n, a in CURRENTS.items()
     ]
+    (tmp_path / "datapackage.json").write_text(json.dumps({"name": "rig-7", "resources": files}))
+    require_the_tests(tmp_path)
+    for of, amperes in zip(files, CURRENTS.values(), strict=True):
+        of |= {"description": "", "experiment": {"coil_current": {"value": amperes, "unit": "A"}}}
     (tmp_path / "datapackage.json").write_text(json.dumps({"name": "rig-7", "resources": files}))
     require_the_tests(tmp_path)
 

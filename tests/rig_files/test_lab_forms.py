@@ -1334,6 +1334,7 @@ def test_samples_of_a_current_over_time_are_no_plan(tmp_path):
     assert not import_files([tmp_path]).records
 
 
+@pytest.mark.parametrize("amplitude", ["Amplitude [mm]", "x_amp_mm"])
 @pytest.mark.parametrize(
     ("frequencies", "amplitudes", "refused"),
     [
@@ -1342,13 +1343,13 @@ def test_samples_of_a_current_over_time_are_no_plan(tmp_path):
     ],
 )  # fmt: skip
 def test_a_plan_whose_rows_state_other_motions_gives_no_currents_until_they_are_answered(
-    frequencies, amplitudes, refused, tmp_path
+    frequencies, amplitudes, refused, amplitude, tmp_path
 ):
     for i, (factor, size) in enumerate(((1, 1.0), (2, 1.0), (1, 0.5))):
         record = rows(T / factor, size * X, force(i / 2))
         (tmp_path / f"run_{i + 1}.csv").write_text("Time [s],disp [mm],force [N]\n" + record)
     lines = [f"{i + 1},{i / 2},{f},{a}\n" for i, (f, a) in enumerate(zip(frequencies, amplitudes, strict=True))]
-    (tmp_path / "plan.csv").write_text("Nr,Current [A],Frequency [Hz],Amplitude [mm]\n" + "".join(lines))
+    (tmp_path / "plan.csv").write_text(f"Nr,Current [A],Frequency [Hz],{amplitude}\n" + "".join(lines))
     found = import_files([tmp_path])
     assert {r.error.code for r in found.refusals} == ({"E_MOTION_CONTRADICTS"} if refused else set())
     profile = parse_profile('[current.values]\n"run_1*" = 0\n"run_2*" = 0.5\n"run_3*" = 1.0\n')

@@ -82,6 +82,17 @@ def test_properties_of_a_channel_state_its_scale(tmp_path):
     expect(tmp_path, 0.6)
 
 
+@pytest.mark.parametrize("key", ["Strom_Einheit", "Strom unit"])
+def test_a_property_of_a_group_has_the_unit_that_another_property_states(tmp_path, key):
+    nptdms = pytest.importorskip("nptdms")
+    channels = (("Zeit", "s", T), ("Weg", "mm", X), ("Kraft", "N", force(0.6)))
+    with nptdms.TdmsWriter(str(tmp_path / "Kennfeld.tdms")) as writer:
+        writer.write_segment([nptdms.GroupObject("V1", {"Strom": 0.6, key: "A", "Ruhestrom": 0.1})])
+        for name, unit, values in channels:
+            writer.write_segment([nptdms.ChannelObject("V1", name, values, {"unit_string": unit})])
+    expect(tmp_path, 0.6)
+
+
 def test_keys_of_nested_structures_are_known_in_other_languages(tmp_path):
     channels = [("Przemieszczenie", "mm", X), ("Siła", "N", force(0.6))]
     tree = {

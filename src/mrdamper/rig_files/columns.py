@@ -30,6 +30,7 @@ _AROUND_UNITS = words("around_units")
 _TIMES = re.compile(r"(?i)(?<!\w)multipl(?:y|ie[ds]?|ier|iz|ic|ik)\w*")  # no multiple, no multiplexer
 _CONVERTER = re.compile(r"(?i)(?<![a-z])(?:adc|counts?|raw|cnts?)(?![a-z])")  # of a converter
 _FACTOR = re.compile(r"(?<![\w.,])[0-9]+(?:[.,][0-9]+)?(?!\w)")
+_NEXT = re.compile(r"[,;|\t()]| (?:and|und|et|y|e|oraz|och|og|и) ")  # between the units of two channels
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,6 +162,12 @@ def noted_columns(table: RawTable, profile: Profile, assigned: Mapping[str, Assi
             yield Finding("W_COLUMN", f"{text}if these are further tests, write the condition of each into its name")
     for role, reason in _left_out(table, profile, columns).items():
         yield Finding("W_COLUMN", f"the {role} channel is not used: {reason}")
+    for role, own in columns.items():
+        header, stated = table.headers[own], profile.channel(role).unit or ""
+        unit = parse_unit(stated)
+        if unit and header.known and unit.dimension == header.dimension and unit != header.known:
+            text = f"{table.title(own)!r} is read in {stated}, as the profile states, not in its own {header.unit}"
+            yield Finding("W_CHOSEN", text)
 
 
 def _left_out(table: RawTable, profile: Profile, columns: Mapping[str, int]) -> dict[str, str]:
@@ -406,16 +413,23 @@ def _unit_problem(table: RawTable, role: str, column: int, unit: str) -> UnitErr
     return _refusal(UnitError, table, problem, remedy, "E_UNITS_DIMENSION")
 
 
-def units_in(line: str) -> list[tuple[str, str]]:
-    """Return the channels of which a line states the unit and nothing else, and the units: the force column is in N."""
+def units_in(line: str, names: Collection[str] = ()) -> list[tuple[str, str]]:
+    """Return the channels of which a line states the unit and nothing else, and the units: the force column is in N.
+
+    A letter stands for a channel only if it is one of some names of columns.
+    """
     line = re.sub(r"\(([^()]*)\)", lambda aside: aside[0] if is_unit(aside[1]) else "", line)
-    cells = [cell.strip(' `*#"') for cell in re.split(r"[,;|\t()]|\. ", line)]
+    return [stated for sentence in line.split(". ") for stated in _units_in_sentence(sentence, names)]
+
+
+def _units_in_sentence(sentence: str, names: Collection[str]) -> list[tuple[str, str]]:
+    cells = [cell.strip(' `*#"') for cell in _NEXT.split(sentence)]
     stated = []
     for cell, behind in pairwise([*cells, ""]):
         text = f"{cell} in {behind}" if is_unit(behind) else re.sub(r"\s*[:=]\s+", " in ", cell.rstrip("."))
         header = split_name(text)
         named = [word for word in words_of(header.name) if word.casefold() not in _AROUND_UNITS]
-        one = header.unit and [len(word) > 2 for word in named] == [True]  # no letter
+        one = header.unit and len(named) == 1 and (len(named[0]) > 2 or named[0].casefold() in names)
         role = column_names.role_of(named[0].removesuffix("s")) if one else None  # forces
         if role and header.dimension == DIMENSION[role]:
             stated.append((role, header.unit))
@@ -428,7 +442,11 @@ def _refuse_two_units(table: RawTable, role: str, column: int, unit: str) -> Non
     """Refuse a column whose name and row of units, or a line beside the columns, state different units."""
     inner = split_name(table.names[column]) if table.units[column] else None
     other = parse_unit(unit)
-    lines = {of: line.strip() for line in table.lines for its, of in units_in(line) if its == role}
+    names = {header.name.casefold() for header in table.headers}
+    lines = {of: line.strip() for line in table.lines for its, of in units_in(line, names) if its == role}
+    own = table.headers[column].name.casefold()
+    for line in [line for line in table.lines if line.partition(";")[0].casefold() == own]:  # x; displacement; cm; LVDT
+        lines |= {of: line for cell in line.split(";") if (of := cell.strip()) and is_unit(of)}
     stated = {of: f"the line {line[:80]!r}" for of, line in lines.items()}
     same = any(parse_unit(of) == other for of in stated)  # what else is stated may be that of other files
     if inner is not None and inner.dimension == DIMENSION[role]:

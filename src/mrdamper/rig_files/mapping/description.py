@@ -92,7 +92,7 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     lines = [line for text in sorted(texts) if len(own := short_lines(text)) <= _MOST for line in own]
     names = {header.name.casefold() for header in table.headers}
     counts, of_file = partial(scales.counts_in, names=names), partial(said_of_file, name=path.name)
-    about = [scales.states_sign, counts, units_in, of_file]
+    about = [scales.states_sign, counts, partial(units_in, names=names), of_file]
     # A current may be that of one test, or an example.
     lines = [line for line in lines if not (stated_by_lines([line], ".") or stated_in_titles([line]))]
     stated = [(lacking and _of_channels(line)) or line * any(tells(line) for tells in about) for line in lines]
@@ -321,7 +321,8 @@ def packaged_lines(path: Path) -> list[str]:
             entries = [e for e in json.loads(content)["resources"] if folder / e["path"] == path]
             fields = [field for entry in entries for field in entry.get("schema", {}).get("fields", [])]
             lines = ["; ".join(str(field.get(key, "")) for key in ("name", "title", "unit")) for field in fields]
-            return [*lines, *(f"description: {entry['description']}" for entry in entries if "description" in entry)]
+            own = ({key: of for key, of in entry.items() if key != "schema"} for entry in entries)
+            return [*lines, *(line for entry in own for line in _stated(entry, ""))]
         except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
             continue  # none, or no data package
     return []

@@ -35,7 +35,13 @@ _REST = 0.1  # of the largest motion: less is that of no test
 _SLACK = 0.01  # of a record, by which a start or an end is rounded
 _MOTIONS = (  # dimension and name of a column, relative difference of two tests, unit of messages and its number per SI
     ("frequency", re.compile(r"(?i)^(?:f\b|freq|frec|fréq|част|频率|周波数|częst)"), 0.15, "Hz", 1.0),
-    ("length", re.compile(r"(?i)ampl|^x_?0$|^(?:stroke|hub|course|carrera|corsa)$|振幅|행정|行程"), 0.5, "mm", 1e3),
+    (
+        "length",
+        re.compile(r"(?i)ampl|(?:^|[_ ])amp$|^x_?0$|^(?:stroke|hub|course|carrera|corsa)$|振幅|행정|行程"),
+        0.5,
+        "mm",
+        1e3,
+    ),
 )
 _PEAK = re.compile(r"(?i)peak|pico|picco|crête|spitze|max|峰|최대|пик|макс")
 _FEWEST_PEAKS = 3  # tests whose peak forces are compared with a plan

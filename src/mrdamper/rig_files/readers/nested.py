@@ -32,6 +32,7 @@ _BODY = re.compile(r"_?(?:data|values)$", re.IGNORECASE)
 (_LISTING,) = sentences("listing")
 _DIRECTION = re.compile(r":[+-]?[SXYZ]$")  # of a point of measurement
 _CLOCK = re.compile(r"(^|[_. ])time[_. ]", re.IGNORECASE)
+_OF_UNIT = re.compile(rf"(?i)[_. ](?:{'|'.join(map(re.escape, KEYS['unit']))})$")  # current_unit, Strom_Einheit
 
 
 @dataclass(frozen=True)
@@ -150,7 +151,8 @@ def _stated_units(tree: Mapping[str, Any]) -> dict[str, str]:
     pairs = next((v for k, v in tree.items() if k.casefold() in KEYS["unit"] and isinstance(v, list)), [])
     pairs = pairs if all(isinstance(item, str) for item in pairs) and {*pairs[::2]} <= {*tree} else []
     stated = stated or dict(zip(pairs[::2], pairs[1::2], strict=False))
-    every = {key[:-5]: unit for key, unit in tree.items() if key.casefold().endswith("_unit")} | dict(stated)
+    tails = ((key[: tail.start()], unit) for key, unit in tree.items() if (tail := _OF_UNIT.search(key)))
+    every = dict(tails) | dict(stated)
     return {key: unit for key, unit in every.items() if isinstance(unit, str) and is_unit(unit)}
 
 
@@ -404,10 +406,10 @@ def _tell(node: _Node, says: Mapping[str, Any], above: str) -> None:
     elif above and isinstance(unit, str) and [float] == [type(v) for v in says.values() if not isinstance(v, str)]:
         says = {f"{key} [{unit}]" if isinstance(v, float) else key: v for key, v in says.items()}
     for key, value in says.items():
+        key = f"{key} [{node.units[key]}]" if key in node.units and isinstance(value, (float, str)) else key
         if isinstance(value, Mapping):
             _tell(node, value, key)
         elif isinstance(value, float) and len(node.constants) < MOST_COLUMNS:
-            key = f"{key} [{node.units[key]}]" if key in node.units else key
             value_of = node.constants.get(key, value)
             node.constants[key if value_of == value else f"{above} {key}"] = value
         elif isinstance(value, list):
