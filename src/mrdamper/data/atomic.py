@@ -71,10 +71,7 @@ def write_folder(folder: str | Path, *, replace: bool = False) -> Generator[Path
 
 @contextmanager
 def write_into(folder: str | Path) -> Generator[Path]:
-    """Give a temporary folder whose files move to `folder` in one step when the block ends.
-
-    Files of the same name are replaced; others stay. Raises `OutputError` if the folder cannot be made or written to.
-    """
+    """Give a temporary folder whose files move into `folder`, beside others, in one step; raises `OutputError`."""
     final = path_of(folder)
     with _beside(final) as work:
         yield work
@@ -111,10 +108,7 @@ def publish(
 
 @contextmanager
 def write_file(path: str | Path) -> Generator[Path]:
-    """Give a temporary path that takes the final name when the block ends without an error.
-
-    Raises `OutputError` if the file cannot be written.
-    """
+    """Give a temporary path that takes the final name when the block ends without an error; raises `OutputError`."""
     final = Path(path).resolve() if Path(path).is_symlink() else Path(path)
     if final.is_dir():
         raise OutputError("is a folder", where=str(final), remedy="give a file name")
@@ -132,10 +126,7 @@ def write_file(path: str | Path) -> Generator[Path]:
 
 
 def require_writable(path: str | Path | None) -> None:
-    """Refuse a path that cannot be written to before the work begins; None is no path.
-
-    Raises `OutputError` then.
-    """
+    """Raise `OutputError`, before work begins, for a path that cannot be written to; None is no path."""
     if path is None or ((final := Path(path)).exists() and not final.is_dir() and not final.is_file()):
         return
     with _beside(final) as work:

@@ -76,10 +76,7 @@ def csv_value(cell: str) -> str:
 
 
 def csv_text(rows: Sequence[Mapping[str, object]], names: Iterable[str] | None = None) -> str:
-    """Rows as CSV; columns in order of first appearance, numbers exact, nothing as an empty cell.
-
-    Cells with a semicolon or a tab are quoted, too, because spreadsheets of some countries split there.
-    """
+    """Rows as CSV, columns by first appearance; cells with ; or a tab are quoted, as some spreadsheets split there."""
     heads = list(names) if names is not None else list(dict.fromkeys(name for row in rows for name in row))
     lines = [",".join(map(_csv_field, heads))]
     for row in rows:  # most fields are numbers

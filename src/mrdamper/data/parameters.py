@@ -47,10 +47,7 @@ def param(
     default: float | None = None,
     symbol: str = "",
 ) -> Any:
-    """Declare a model parameter as a dataclass field (see `ParameterInfo` for the meanings).
-
-    Without a `symbol` it follows from the name (`latex_symbol`).
-    """
+    """Declare a model parameter as a dataclass field (see `ParameterInfo`); its symbol is by default from the name."""
     facts = dict(unit=unit, meaning=meaning, bounds=bounds, scale=scale, linear=linear, preset=preset, symbol=symbol)
     metadata = {_KEY: facts}
     if default is None:
@@ -72,10 +69,7 @@ def parameters_of(owner: type) -> tuple[ParameterInfo, ...]:
 
 
 def with_values(kind: type[T], values: Mapping[str, float]) -> T:
-    """Make an object with some of its parameters set.
-
-    Raises `ParameterError` if there is no such parameter, one is missing, or a value lies outside its bounds.
-    """
+    """Make an object with some parameters set; raises `ParameterError` for an unknown, missing or forbidden one."""
     infos = {info.name: info for info in parameters_of(kind)}
     for name, value in values.items():
         if name not in infos:

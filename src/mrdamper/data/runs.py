@@ -300,10 +300,7 @@ def _equal(one: Any, other: Any) -> bool:
 
 
 def require_name(what: str, name: object) -> None:
-    """Refuse a name that is not safe on a page, in a terminal or in a table.
-
-    Raises `RunError` unless it is printable text of one line.
-    """
+    """Refuse, by `RunError`, a name that is not printable text of one line, as a page, terminal or table needs it."""
     if not isinstance(name, str) or len(name) > _MAX_NAME_CHARACTERS or printable(name) != name:
         raise RunError(
             f"the {what} is {shown(name)}",

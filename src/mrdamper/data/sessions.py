@@ -32,10 +32,7 @@ def session_of(run: Run) -> str | None:
 
 
 def session_groups(sessions: Iterable[str | None]) -> list[list[int]]:
-    """Group the indices of runs by session, in the order of the names; empty under three known sessions.
-
-    A run of unknown session is in no group.
-    """
+    """Group the indices of runs by session, in the order of names, unknown ones in none; empty under three sessions."""
     groups: dict[str, list[int]] = {}
     for i, session in enumerate(sessions):
         if session is not None:
@@ -56,10 +53,7 @@ def session_folds(runs: Sequence[Run]) -> list[list[int]]:
 
 
 def hour_of(run: Run) -> float | None:
-    """Hours since 1970-01-01 at which a run was recorded; None where no time of day is known.
-
-    Raises `InputError` (E_CLOCK) if the clock is no date.
-    """
+    """Hours from 1970-01-01 to a run; None without a time of day; raises `InputError` (E_CLOCK) if it is no date."""
     clock = _clock_of(run)
     if clock is None or len(str(run.notes["recorded_at"]).strip()) <= len("2024-05-31"):
         return None

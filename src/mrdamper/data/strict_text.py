@@ -28,10 +28,7 @@ _DOTTED = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++\s*+\.\s*+){17}""")  # those of
 
 
 def open_regular(path: Path) -> BinaryIO:
-    """Open a file for reading bytes, without waiting.
-
-    Raises `OSError` if it cannot be opened, or is a pipe, a socket or a device.
-    """
+    """Open a file for reading bytes without waiting; raises `OSError` also for a pipe, a socket or a device."""
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     if not stat.S_ISREG(os.fstat(handle).st_mode):
         os.close(handle)
@@ -40,10 +37,7 @@ def open_regular(path: Path) -> BinaryIO:
 
 
 def content_of(path: Path, largest: int, refuse: type[InputError], kind: str) -> bytes:
-    """Return the bytes of a file that should be `kind`, as "a CSV file"; at most its largest size is read.
-
-    Raises `refuse` if it cannot be read, or is larger.
-    """
+    """Return the bytes of a file that should be `kind` ("a CSV file"); raises `refuse` if unreadable or too large."""
     try:
         with open_regular(path) as file:
             content = file.read(largest + 1)
@@ -115,10 +109,7 @@ def is_table(value: object) -> TypeGuard[dict[str, Any]]:
 
 
 def read_toml(text: str) -> dict[str, Any]:
-    """Return a TOML document.
-
-    Raises `tomllib.TOMLDecodeError` if it is none, too long or nested too deeply.
-    """
+    """Return a TOML document; raises `tomllib.TOMLDecodeError` if it is none, too long or nested too deeply."""
     if len(text) > _LONGEST:
         raise tomllib.TOMLDecodeError(f"{len(text):,} characters; at most {_LONGEST:,}")
     if _DOTTED.search(text):

@@ -42,10 +42,7 @@ class Exporter(ABC):
 
 
 def write_export(written: Written, out: str | Path, suffix: str) -> list[Path]:
-    """Write the files of an export atomically: one file at `out`, or several into the folder `out`.
-
-    Raises `OutputError` if it cannot be written.
-    """
+    """Write the files of an export atomically, one at `out` or several into that folder; raises `OutputError`."""
     out = Path(out)
     if suffix and not out.is_dir():
         with write_file(out) as target:

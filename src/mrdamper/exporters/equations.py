@@ -18,10 +18,7 @@ NOWHERE = Condition(0.0, 1.0, 0.01)  # any condition: a damper without ranges ha
 
 
 def equations(damper: Damper) -> list[str]:
-    """One line of LaTeX per equation: the force, the state, then the parameter functions.
-
-    Raises `ParameterError` if the damper has no readable equation.
-    """
+    """One line of LaTeX per equation: force, state, parameter functions; raises `ParameterError` if there is none."""
     if not damper.equation:
         raise ParameterError(
             "no equations to print", where=damper.title, remedy="export a damper with a model behind it"

@@ -184,9 +184,8 @@ def all_texts(
 ) -> dict[str, bytes]:
     """Collect the texts of an FMU by path: C sources and those of an instance, its description, its reference.
 
-    The token in them is a hash of the others.
-    `facts` are for the templates, `instance` and `page` the templates of the FMI functions and of the documentation.
-    `time` [s], `given` and `outputs` are the reference, (N,) each.
+    The token in them is a hash of the others. `instance` and `page` are the templates of the FMI functions and of the
+    documentation, `time` [s], `given` and `outputs` the reference, (N,) each.
     """
     tables = {
         "resources/reference_in.csv": csv_text(rows_of({"time": time, **given})).encode(),

@@ -46,10 +46,7 @@ def here() -> Platform | None:
 
 
 def compiler_for(wanted: Platform) -> tuple[str, ...]:
-    """Return the command that compiles for a platform; empty if there is none.
-
-    The compiler of the system is preferred, then zig (`pip install ziglang`), which compiles for all platforms.
-    """
+    """Return the command that compiles for a platform: that of the system, else zig (ziglang); empty without one."""
     if wanted == here() and wanted.suffix != ".dll":
         compilers = (path for name in ("cc", "gcc", "clang") if (path := shutil.which(name)))
         if path := next(compilers, None):

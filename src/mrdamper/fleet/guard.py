@@ -45,11 +45,7 @@ class KillableWorker:
         self._closed = False
 
     def call(self, function: str, argument: Any) -> Any:
-        """Return the result of `module:function` of an argument, both as JSON.
-
-        A job whose process was killed from outside is repeated. Raises `JobError`: E_JOB_CRASH, E_JOB_TIME or
-        E_JOB_MEMORY. Raises `InputError`: what the function raised.
-        """
+        """Return the result of `module:function` of a JSON argument; raises `JobError`, or what the function raised."""
         killed = crashed = 0
         while True:
             answer, died = self._ask({"call": function, "argument": argument, "limits": asdict(self._limits)})

@@ -71,10 +71,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
 
 
 def _limit(seconds: float | None, size: int | None) -> None:
-    """From here on, this much processor time and memory that is written to; None lifts the limits.
-
-    Beyond its processor time the system ends the process, also inside a library.
-    """
+    """Limit further processor time, beyond which the system ends the process, and written memory; None lifts both."""
     if sys.platform == "win32":
         return
     import resource

@@ -48,10 +48,7 @@ class Settings:
 
 @on_one_blas_thread
 def measure(job: dict[str, Any]) -> dict[str, Any]:
-    """Calculate the row of one damper; `job` holds an item, its digest, settings and the plan, if there is one.
-
-    Raises `InputError` if its records cannot be used.
-    """
+    """Calculate the row of one damper from a job of `as_job`; raises `InputError` if its records cannot be used."""
     begin = time.perf_counter(), time.process_time()
     if job["version"] != VERSION:
         raise FleetError(
@@ -97,10 +94,7 @@ def refused(error: InputError) -> dict[str, Any]:
 
 
 def read(item: Item, settings: Settings) -> tuple[Dataset, tuple[str, ...]]:
-    """Read the records of one damper; return them and the codes of their findings.
-
-    Raises `InputError` if they cannot be read, or come from several rigs.
-    """
+    """Read the records of one damper, and codes of their findings; raises `InputError` unless they are of one rig."""
     findings: list[str] = []
     if item.kind == "lake":
         from mrdamper.fleet.parquet_folder import parquet_dataset

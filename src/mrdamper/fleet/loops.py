@@ -64,10 +64,7 @@ def velocity_ladder(model: Model, currents: Sequence[float], speeds: Sequence[fl
 
 
 def gas_and_friction(ladder: Floats, speeds: Sequence[float]) -> tuple[float, float]:
-    """Gas force and friction [N] at the lowest current, which is the first, extrapolated to zero velocity.
-
-    The gas force is the mean of rebound and compression, friction half their difference.
-    """
+    """Gas force and friction [N] at the lowest current and rest: mean and half difference of both directions."""
     slow, fast = ladder[0, :2]
     rebound, compression = slow - speeds[0] / (speeds[1] - speeds[0]) * (fast - slow)
     return float(rebound + compression) / 2, float(rebound - compression) / 2

@@ -28,10 +28,7 @@ def is_parquet_folder(paths: Sequence[Path], profile: FleetProfile) -> bool:
 
 
 def parquet_items(paths: Sequence[Path], profile: FleetProfile) -> list[Item]:
-    """Find the dampers of a folder of Parquet files, each with the rows it occupies in every file.
-
-    A file that cannot be read, or lacks a column, becomes an item with the error; the others are used.
-    """
+    """Find the dampers of Parquet files and their rows in each; a file that cannot be used is an item with an error."""
     import polars as pl
 
     places_of: dict[Item, list[tuple[str, tuple[int, int]]]] = {}
@@ -70,11 +67,7 @@ def parquet_items(paths: Sequence[Path], profile: FleetProfile) -> list[Item]:
 
 
 def parquet_dataset(item: Item) -> Dataset:
-    """Read the records of one damper from a folder of Parquet files.
-
-    Raises `ColumnError` or `RunError` or `TimeOrderError` or `NonFiniteError` if the channels of a run do not fit
-    together.
-    """
+    """Read the records of one damper from Parquet files; raises `InputError` if the channels of a run do not match."""
     import polars as pl
 
     parts = []

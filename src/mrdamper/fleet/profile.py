@@ -100,10 +100,7 @@ class ColumnLimits(BaseModel, extra="forbid", frozen=True):
 
 
 def load_fleet_profile(path: str | Path | None) -> FleetProfile:
-    """Read a fleet profile; without a path, the default.
-
-    Raises `ProfileError` if it is no TOML, or a key or value is not known.
-    """
+    """Read a fleet profile, the default without a path; raises `ProfileError` on an unknown key or value."""
     if path is None:
         return FleetProfile()
     profile = load_toml(Path(path), FleetProfile, ProfileError, _HELP)
@@ -113,8 +110,5 @@ def load_fleet_profile(path: str | Path | None) -> FleetProfile:
 
 
 def load_limits(path: str | Path) -> dict[str, ColumnLimits]:
-    """Read the column limits of a limits file: tables [limits.COLUMN] with lower, upper or both.
-
-    Raises `LimitsError` if it is no TOML, a key is not known, or a lower limit is not below the upper.
-    """
+    """Read the [limits.COLUMN] tables of a limits file; raises `LimitsError` on an unknown key or a wrong limit."""
     return load_part(path, {COLUMN_LIMITS: (dict[str, ColumnLimits], ...)})[COLUMN_LIMITS]

@@ -41,10 +41,7 @@ class PaperAssumptions:
 
     @classmethod
     def of(cls, train: Sequence[Run], gas: GasSpring | None) -> PaperAssumptions:
-        """Take the gas spring, or separate stiffness and mass by the frequencies of the identification runs.
-
-        Raises `ParameterError` if the motion leaves no gas volume.
-        """
+        """Take the gas spring (`ParameterError` without gas volume), or separate stiffness and mass by frequency."""
         if gas is not None:
             longest = max(float(np.ptp(run.displacement)) / 2 for run in train)
             gas.force([-longest, longest])  # refuses motions that leave no gas volume
@@ -92,10 +89,7 @@ def missing_functions(conditions: Sequence[Condition]) -> tuple[str, ...]:
 
 
 def require_paper_functions(train: Sequence[Run]) -> None:
-    """Refuse tests that do not determine every function of the paper.
-
-    Raises `IdentificationError` E_PAPER_TESTS with the functions by name.
-    """
+    """Refuse, as E_PAPER_TESTS with their names, tests that do not determine every function of the paper."""
     conditions = [analyse_motion(run).condition for run in train]
     if missing := missing_functions(conditions):
         names = ("current", "currents"), ("frequency", "frequencies"), ("amplitude", "amplitudes")

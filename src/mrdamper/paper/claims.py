@@ -191,10 +191,7 @@ def _checked(study: Reproduction, key: str, row: _Row, measured: Measured) -> Cl
 
 
 def verdict_on(key: str, values: Sequence[float]) -> Verdict:
-    """Return the verdict on a claim of `ROWS`; raises `UnknownNameError` if there is no such claim.
-
-    The values come in the order of its limits; NaN where one is missing, none where it could not be measured.
-    """
+    """Return the verdict on a claim of `ROWS` for values in the order of its limits; NaN where one is missing."""
     if key not in ROWS:
         raise UnknownNameError.of("claim", key, ROWS)
     limits = ROWS[key].limits

@@ -121,10 +121,7 @@ def saturation(study: Reproduction) -> Measured:
 
 
 def friction_along(run: Run) -> tuple[Floats, Floats]:
-    """Return positions [m] and friction [N] of a slow test: half the force between out-stroke and in-stroke.
-
-    At one position the gas force is equal in both strokes and cancels.
-    """
+    """Return positions [m] and friction [N] of a slow test: half of out-stroke less in-stroke, where gas cancels."""
     path, sweeps = measured_motion(run).path, []
     for stroke in np.argsort(np.bincount(path.stroke))[-2:]:
         inside = path.stroke == stroke
@@ -160,9 +157,7 @@ def lost_length(run: Run, damping: float, stiffness: float = 0.0) -> float:
 
 
 def rising_shares(conditions: Sequence[Condition], energies: Sequence[float]) -> tuple[float, float]:
-    """Return the shares of steps in current at one motion, and in frequency at one current and amplitude, that raise
-    the energy; NaN where there is no such step.
-    """
+    """Return the shares of current steps, and of frequency steps, that raise the energy; NaN where there is none."""
     keys = [(round(c.current_A, 2), round(np.log(c.amplitude_m) / SAME)) for c in conditions]
     alike = [[i for i, k in enumerate(keys) if k == key] for key in sorted(set(keys))]
 

@@ -44,10 +44,7 @@ class DirectGenetic(Method):
         return replace(self, genetic=replace(self.genetic, generations=GENERATIONS_OF_MANY))
 
     def solve(self, problem: Problem) -> Solution:
-        """Determine the free parameters of a problem.
-
-        Raises `IdentificationError` if the model is not Bouc–Wen, and `ExcitationError` if the motion is no sine.
-        """
+        """Determine the free parameters; raises `IdentificationError`, or `ExcitationError` if there is no sine."""
         return self.solution(problem, self.genetic_search(problem))
 
     def genetic_search(self, problem: Problem) -> GeneticMinimum:

@@ -22,10 +22,7 @@ GENERATIONS_OF_MANY = 60  # generations of a search in a study of many runs
 
 @dataclass(frozen=True)
 class GeneticSettings:
-    """Settings of the search; the defaults are the paper's.
-
-    Raises `ParameterError` if a share lies outside 0...1 or a count is too small.
-    """
+    """Settings of the search, by default the paper's; raises `ParameterError` for a share or count out of range."""
 
     population: int = 100
     generations: int = 500

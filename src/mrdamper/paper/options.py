@@ -100,11 +100,7 @@ class PaperOptions(StudyMethod):
         )  # fmt: skip
 
     def recipe(self, train: Sequence[Run]) -> Recipe:
-        """Make the recipe: every sine run by the paper's method, then its functions over the conditions.
-
-        Raises `IdentificationError` E_PAPER_TESTS if the runs do not determine every function of the paper, and
-        `ParameterError` if the motion leaves no gas volume.
-        """
+        """Make the recipe; raises `IdentificationError` E_PAPER_TESTS, or `ParameterError` without gas volume."""
         if self.functions == "paper":
             require_paper_functions(train)
         assumptions = PaperAssumptions.of(train, self.gas).preset(self.fixed)

@@ -42,11 +42,7 @@ def write_reproduction(
     png: bool = False,
     processes: Processes = IN_PROCESS,
 ) -> list[Path]:
-    """Write reproduction.html, tables/ and figures/, and return the files, the page first.
-
-    The folder is made if missing; files of the same names are replaced together at the end. Figures are drawn in
-    `processes`, with `png` as PNG beside the SVG. Raises `OutputError` if the folder cannot be written to.
-    """
+    """Write reproduction.html, tables/ and figures/ atomically, drawn in `processes`; return the page and the rest."""
     claims, names, parts = check_claims(study), tuple(FIGURES), 2 * processes.count
     drawn: dict[str, Picture | str] = {}
     draw = partial(pictures, study, ("png",) if png else ())

@@ -50,10 +50,7 @@ def recipes_of_paper(
     *,
     explain: bool = True,
 ) -> Steps:
-    """Return the compared recipes, except for the expensive ones, and the identification runs of each.
-
-    With `explain` the literal method states the hysteretic part of c for every run.
-    """
+    """Return the fast recipes and their runs; with `explain` the literal one states the hysteretic part of c."""
     literal = replace(options.method("optimum"), explain=explain)
     half = replace(literal, force_amplitude="half-peak-to-peak", explain=False)
     consistent = assumptions.basis(Balance())
@@ -74,10 +71,7 @@ def recipes_of_paper(
 
 
 def comparators(train: Sequence[Run], held_out: Sequence[Run], assumptions: PaperAssumptions) -> Steps:
-    """Return the paper's comparators: all parameters by the genetic algorithm, one run per current; Ali's model.
-
-    Ali's model, which integrates every run thousands of times, is identified at every other current of a large matrix.
-    """
+    """Return the paper's comparators: genetic search, a run per current; Ali's slow model, at every other of many."""
     basis = assumptions.basis(DirectGenetic.name)
     direct = Recipe("bouc-wen:direct-genetic", basis, one_per_current, "traditional", DIRECT)
     ali = replace(conditioned(all_published()["ali-type"]), way="literature", title=ALI)

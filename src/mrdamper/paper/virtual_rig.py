@@ -108,10 +108,7 @@ class VirtualRig:
         )
 
     def sense(self, motion: Excitation, force: Floats, rng: np.random.Generator, **labels: Any) -> Run:
-        """Return the record of a motion and its true force [N]: delayed, noisy, quantised.
-
-        `labels` are fields of `Run`.
-        """
+        """Return the record of a motion and its true force [N], delayed, noisy, quantised, with fields of `Run`."""
         late = np.interp(motion.time - self.force_delay, motion.time, force)
         x = motion.displacement + self.displacement_noise * rng.standard_normal(len(motion))
         return Run(
@@ -173,10 +170,7 @@ def true_runs(
 
 
 def friction_test(rig: VirtualRig, seed: int = 0, *, filled: bool = False) -> Run:
-    """Test one cycle of 20 mm at 0.01 mm/s without current [Qian et al. 2024, section 2]; synthetic.
-
-    The paper's test is without fluid: it contains no yield and no viscous force. With `filled` it has the fluid.
-    """
+    """Test one cycle of 20 mm at 0.01 mm/s, 0 A [section 2], without fluid as in the paper or `filled`; synthetic."""
     if not filled:
         rig = replace(rig, yield_off=0.0, yield_per_ampere=0.0, viscosity=0.0, viscosity_per_ampere=0.0)
     condition = Condition(0.0, SLOW_SPEED / (4 * 0.020), 0.020)

@@ -83,11 +83,7 @@ class Limit(BaseModel, extra="forbid", frozen=True):
 
 
 def load_about(path: str | Path) -> About:
-    """Read the head of a report from a TOML file.
-
-    Raises `AboutError` if it cannot be read, holds an unknown field or a field that is no text or number, or names a
-    logo that is no PNG or JPEG or is too large.
-    """
+    """Read the head of a report from a TOML file; raises `AboutError` for an unknown field or an unusable logo."""
     path = Path(path)
     about = load_toml(path, About, AboutError, _HELP)
     if not about.logo:
@@ -98,18 +94,12 @@ def load_about(path: str | Path) -> About:
 
 
 def about_of(table: Mapping[str, Any], where: str) -> About:
-    """Return the head of a report from its fields; the logo is a data address already.
-
-    Raises `AboutError` if a field is unknown, or no text or number.
-    """
+    """Return the head of a report from its fields, the logo a data address; raises `AboutError` for a wrong field."""
     return checked_table(table, About, AboutError, _HELP, where)
 
 
 def logo_of(text: str) -> str:
-    """Convert a picture in base64 to a data address for a page.
-
-    Raises `AboutError` if it is no base64, no PNG or JPEG, or too large.
-    """
+    """Convert a picture in base64 to a data address; raises `AboutError` if it is no PNG or JPEG, or too large."""
     try:
         data = base64.b64decode(text, validate=True)
     except ValueError as error:
@@ -118,11 +108,7 @@ def logo_of(text: str) -> str:
 
 
 def load_limits(path: str | Path) -> tuple[Limit, ...]:
-    """Read the force limits of a limits file: one `[[limit]]` table per limit.
-
-    Raises `AboutError` if it cannot be read, a key is unknown, two limits at one point exclude each other, or a limit
-    is incomplete, no number, without a side, or has its lower force above the upper one.
-    """
+    """Read the `[[limit]]` tables of a limits file; raises `AboutError` for a wrong one, or two that conflict."""
     kind = Annotated[tuple[Limit, ...], AfterValidator(_without_exclusion)]
     return load_part(path, {FORCE_LIMITS: (kind, ...)}, AboutError)[FORCE_LIMITS]
 
@@ -167,10 +153,7 @@ def _picture(data: bytes, where: str) -> str:
 
 
 def parse_ladder(text: str) -> tuple[float, ...]:
-    """Velocities [m/s] of a table of forces from "0.05, 0.1, 0.2"; empty for the default.
-
-    Raises `AboutError` if one is no positive number, or over 20 are given.
-    """
+    """Velocities [m/s] from "0.05, 0.1", none for the default; raises `AboutError` unless up to 20 positive numbers."""
     words = [word for word in text.replace(",", " ").split() if word]
     try:
         steps = [float(word) for word in words]

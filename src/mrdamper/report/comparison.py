@@ -31,11 +31,7 @@ _LOOPS, _OVERLAID = 3, 5
 def write_comparison(
     comparison: Comparison, folder: str | Path, progress: Progress = silent, *, png: bool = False
 ) -> list[Path]:
-    """Write the comparison atomically, and return the files, the page first.
-
-    The folder is made if missing; files of the same names are replaced together at the end. With `png` every figure is
-    written as PNG beside the SVG. Raises `OutputError` if the folder cannot be written to.
-    """
+    """Write the comparison atomically, its figures with `png` also as PNG; return the files, the page first."""
 
     def fill(work: Path) -> None:
         (work / "figures").mkdir()

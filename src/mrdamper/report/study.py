@@ -254,10 +254,7 @@ def _range(ends: tuple[float, float] | None, unit: str) -> str:
 
 
 def _parameter_rows(study: Study) -> list[dict[str, Any]]:
-    """Tabulate the parameters of the chosen dampers, their 95 % intervals and their range in cross-validation.
-
-    Cells are empty where there are none.
-    """
+    """Tabulate the parameters of the chosen dampers, their 95 % intervals and ranges in cross-validation, if any."""
     names = {"low": "low_95", "high": "high_95"}
     return [
         {"rig": rig.dataset.name}

@@ -37,11 +37,7 @@ def compare_controllers(
     highest: float | None = None,
     progress: Progress = silent,
 ) -> ControllerComparison:
-    """Run controllers at the step of a simulation, which stands for its own controller.
-
-    `source`, `dampers`, `highest`: those of `simulate_system`; `controllers`: compared with no current, the highest
-    current and the non-causal optimum; `progress`: called with the step and the share done, 0...1.
-    """
+    """Run no current, the highest current, some controllers and the non-causal optimum at the step of a simulation."""
     if highest is None:
         highest = max(damper.envelope.current_A[1] for damper in dampers.values())
     between = {"no current": Passive(), f"{highest:.3g} A": Passive(highest), **{_title(c): c for c in controllers}}

@@ -49,10 +49,7 @@ class Demand:
 
 
 def check_monotone(damper: Damper, highest: float | None = None) -> float:
-    """Widest reachable interval [N] along a tested sine; the force must not decrease with current.
-
-    Raises `ParameterError` (E_NOT_MONOTONE) with the current above which it decreases.
-    """
+    """Widest reachable interval [N] along a tested sine; raises `ParameterError` where the force falls with current."""
     if highest is not None and not highest > 0:
         raise ParameterError(
             f"highest is {highest:g} A", where=damper.title, remedy="give a current above 0 A", code="E_ARGUMENT"

@@ -58,10 +58,7 @@ class LoopElement:
         return len(self.given), len(self.derived), len(self.start)
 
     def at(self, given: tuple[float, ...], scale: tuple[float, float]) -> LoopElement:
-        """Return the element with other parameters, gain and offset.
-
-        Raises `ParameterError` if they need another program: another branch, or other bounds.
-        """
+        """Return the element with other parameters and scale; raises `ParameterError` if they need another program."""
         derived = self.source.prepare(given)
         if derived is None or len(given) != len(self.given):
             raise ParameterError("parameters that need another program", remedy="trace that damper by itself")

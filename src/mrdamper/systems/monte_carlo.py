@@ -58,8 +58,6 @@ def draw(dampers: Mapping[str, Damper], count: int, seed: int = 1) -> list[dict[
     Links that share a damper share its parameters; each has its own session. Distributions are Student's, with the
     degrees of freedom of the estimates. The model error (`Uncertainty.force`) is not sampled. Raises `InputError`
     (E_CERTAINTY) if a damper has no uncertainty, E_DRAWS if the count is out of range.
-
-    `dampers`: by link, with `uncertainty`.
     """
     if not 2 <= count <= _MAX_DRAWS:
         raise InputError(f"{count} draws", remedy=f"give 2 to {_MAX_DRAWS:,}", code="E_DRAWS")

@@ -164,10 +164,7 @@ class Simulation(Displayable):
 
     @cached_property
     def energy(self) -> dict[str, Floats]:
-        """(N,) energies since the start [J]: of the input, stored, dissipated by the structure, absorbed by each link.
-
-        By the trapezoidal rule, as in the time integration.
-        """
+        """(N,) energies since the start [J], by trapezoids: of the input, stored, lost in the structure, by link."""
         system, names = self.system, [link.name for link in self.links]
         (B, D), series = self.system.extensions(self.links), np.zeros((3 + len(names), self.time.size))
         for begin in range(0, self.time.size - 1, PART):

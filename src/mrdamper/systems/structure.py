@@ -144,10 +144,7 @@ def shear_building(
     links: Sequence[Link] = (),
     title: str = "",
 ) -> System:
-    """Storeys one above the other.
-
-    `masses`, `stiffnesses`, `dampings`: by storey from below [kg], [N/m], [N s/m].
-    """
+    """Storeys one above the other, by masses [kg], stiffnesses [N/m] and dampings [N s/m] from below."""
     floors = tuple(f"floor{i + 1}" for i in range(len(masses)))
     M = np.diag(np.array(masses, dtype=float))
     return building(name, floors, M, _chain(dampings), _chain(stiffnesses), links, title)

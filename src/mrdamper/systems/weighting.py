@@ -58,10 +58,7 @@ def frequency_weighted(acceleration: Floats, step: float, weighting: str) -> Flo
     """Weight an acceleration by its effect on a person.
 
     The gain is applied to the spectrum, with zeros appended for the decay of the filter, so that the gain does not
-    depend on the sampling rate, as that of the bilinear transform does. Raises `UnknownNameError` if there is no such
-    weighting.
-
-    `acceleration` (N,) [m/s²]; `step` [s]; `weighting`: "Wk", "Wd", "Wf".
+    depend on the sampling rate, as that of the bilinear transform does.
     """
     if weighting not in WEIGHTINGS:
         raise UnknownNameError.of("weighting", weighting, WEIGHTINGS)

@@ -90,10 +90,7 @@ def create_app(
 
 
 def plotly_script() -> Path:
-    """Return the script of the chart library inside the plotly package, found without importing it.
-
-    Raises `MissingExtraError` if the package is not installed.
-    """
+    """Find the script of the chart library without importing it; raises `MissingExtraError` if it is not installed."""
     spec = importlib.util.find_spec("plotly")
     script = Path(spec.origin).parent / "package_data" / "plotly.min.js" if spec and spec.origin else None
     if script is None or not script.is_file():
@@ -141,10 +138,7 @@ def _invalid_request(request: Request, error: RequestValidationError) -> JSONRes
 
 
 class _InternalErrors:
-    """Response to an internal error: the terminal shows the traceback, the page a message without details.
-
-    Inside the guard, which adds its headers to this response too.
-    """
+    """Response to an internal error, its details on the terminal only; inside `Guard`, which adds headers to it too."""
 
     def __init__(self, app: ASGIApp):
         self.app = app

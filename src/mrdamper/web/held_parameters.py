@@ -18,10 +18,7 @@ _RANGE = 10.0  # factor from the value to the ends of a logarithmic slider
 
 
 def held_model(damper: Damper, condition: Condition, held: Mapping[str, float]) -> ForceLaw:
-    """Return the model at a condition with some parameters held.
-
-    Raises `ParameterError` if the model has no such parameter, or the value is outside its bounds.
-    """
+    """Return the model at a condition, some parameters held; raises `ParameterError` on a bad name or value."""
     model = damper.model_at(condition)
     if not held:
         return model
@@ -43,11 +40,7 @@ def predict_held(damper: Damper, condition: Condition, held: Mapping[str, float]
 
 
 def as_damper(damper: Damper, held: Mapping[str, float]) -> Damper:
-    """Return a damper that has the held parameters.
-
-    Raises `InputError` if a held parameter is not one of the damper but follows from a function of the condition
-    for another coordinate.
-    """
+    """Return a damper with held parameters; raises `InputError` if one follows from a function of the condition."""
     if not held:
         return damper
     about = {**damper.provenance, "held by hand": ", ".join(f"{n} = {v!r}" for n, v in sorted(held.items()))}

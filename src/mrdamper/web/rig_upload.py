@@ -24,10 +24,7 @@ _MAX_GUESSES = 5  # files searched for the first whose format can be guessed
 
 
 def read_rig_files(upload: Upload, toml: str, refused_only: bool, only: Path | None = None) -> ImportedData:
-    """Read all files of an upload, the refused ones or one, with a profile as TOML; empty to guess.
-
-    Raises `InputError` if the profile cannot be read, and `AllRefusedError` if every file is refused.
-    """
+    """Read files of an upload with a profile as TOML, empty to guess; raises `AllRefusedError` if all are refused."""
     profile = parse_profile(toml) if toml.strip() else None
     tables = [path for path, name in upload.names.items() if PurePosixPath(name).name == TESTS]
     wanted = [path for path in upload.names if path not in tables and (not refused_only or path in upload.refused)]

@@ -69,10 +69,7 @@ class _Contents(BaseModel, extra="forbid", strict=True):
 
 
 def save_project(session: Session, state: str, shown: str | None, logo: str = "") -> bytes:
-    """Return a session as the bytes of a file; `shown` is the key of the damper of the Model view.
-
-    Raises `SavedProjectError` if the file would be too large to open, and `AboutError` if the logo is no picture.
-    """
+    """Return a session as a file, `shown` the damper of the Model view; raises `SavedProjectError` if too large."""
     picture = _picture(logo)
     imported, dampers = session.imported, list(session.dampers.values())
     files = [f"dampers/{i}.json" for i in range(len(dampers))]
@@ -102,11 +99,7 @@ def save_project(session: Session, state: str, shown: str | None, logo: str = ""
 
 
 def open_saved_project(path: Path, place: Path) -> SavedProject:
-    """Read a saved project; its data may be unpacked in the folder `place`.
-
-    Raises `SavedProjectError` if the file is no project, is damaged, or has unknown parts, and `InputError` if a
-    dataset or model in it cannot be read.
-    """
+    """Read a saved project, its data unpacked in `place`; raises `SavedProjectError`, or another `InputError`."""
     try:
         with zipfile.ZipFile(path) as archive:
             return _read(archive, place / "project")

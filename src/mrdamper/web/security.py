@@ -38,10 +38,7 @@ _OWN_SITES = frozenset({"same-origin", "none"})  # sec-fetch-site of the app's p
 
 
 class Guard:
-    """Refuse foreign requests, and add the headers above to every response.
-
-    `hosts`: accepted values of the Host header, with the port.
-    """
+    """Refuse foreign requests, and add headers to every response; `hosts`: accepted Host headers, with the port."""
 
     def __init__(self, app: ASGIApp, hosts: Iterable[str]):
         self.app = app

@@ -166,10 +166,7 @@ class Session:
         return job.report()
 
     def job(self, key: str) -> Job:
-        """Return a job by its key.
-
-        Raises `UnknownNameError` if there is none: it was on earlier data, or was replaced by another.
-        """
+        """Return a job by its key; raises `UnknownNameError` if it was on earlier data, or was replaced by another."""
         for job in (*self.newest.values(), *self.jobs.values()):
             if job.key == key:
                 return job

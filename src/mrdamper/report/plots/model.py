@@ -101,10 +101,7 @@ def parameter_curves(fit: ModifiedFit) -> Figure:
 
 
 def score_strip(validations: Mapping[str, Validation]) -> Figure:
-    """Draw nrmse_pp of every run, one row per model and split; the bar is the median, the tick the scatter of the run.
-
-    Errors beyond 25 % are arrows at the edge.
-    """
+    """Draw nrmse_pp of every run, a row per model and split; bars: medians, ticks: scatter, arrows: beyond 25 %."""
     figure, axes = new_figure(1, 1, 0.8 + 0.3 * len(validations), left=room_beside(validations))
     for row, validation in enumerate(validations.values()):
         colour = PALETTE[1 + row % (len(PALETTE) - 2)]

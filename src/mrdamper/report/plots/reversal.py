@@ -15,10 +15,7 @@ _FARTHEST = 1.5e-3  # m
 
 
 def force_since_reversal(runs: Sequence[Run], damper: Damper) -> Figure:
-    """Draw the mean force in the direction of motion over the distance since the reversal, relative to its peak.
-
-    Colours are currents; the thin line on each is the damper's prediction.
-    """
+    """Draw the mean force along the motion over the distance since the reversal, by current; thin lines: predicted."""
     figure, axes = new_figure(1, 1, 3.0, right=1.2)
     steps = levels([run.mean_current for run in runs])
     colours = current_colours(steps)

@@ -36,10 +36,7 @@ class Sensors:
     shared: dict[str, Any]  # shared data of the laws of several dampers
 
     def __call__(self, point: str, quantity: str) -> Any:
-        """Return a signal: "position", "velocity" or "acceleration" (absolute) of a point.
-
-        The point is a name in the system, or "above" or "below" the damper.
-        """
+        """Return the absolute "position", "velocity" or "acceleration" of a point, or "above" or "below" the damper."""
         name = {"above": self.link.above, "below": self.link.below}.get(point, point)
         return self.signal(f"{name}.{quantity}")
 

@@ -31,13 +31,7 @@ class Skyhook(Controller):
 
 @dataclass(frozen=True)
 class SkyhookContinuous(Controller):
-    """F = c_sky v_above, as far as the damper can.
-
-    References
-    ----------
-    Karnopp, Crosby and Harwood (1974), "Vibration control using semi-active force generators",
-    ASME J. Engineering for Industry 96, 619–626.
-    """
+    """F = c_sky v_above, as far as the damper can; published with `Skyhook`."""
 
     name: ClassVar[str] = "skyhook-continuous"
     title: ClassVar[str] = "skyhook, continuous"

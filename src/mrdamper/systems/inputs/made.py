@@ -79,10 +79,7 @@ class Steps(Input):
 
 @dataclass(frozen=True)
 class Sweep(Input):
-    """A sin φ(t), the frequency rising in proportion to its logarithm; amplitude falls as 1/f above the first.
-
-    The velocity of the road is at most that at the lowest frequency, as on a test rig with limited oil flow.
-    """
+    """A sin φ(t) of exponentially rising frequency; the amplitude falls as 1/f, as on a rig with limited oil flow."""
 
     name: ClassVar[str] = "sweep"
     title: ClassVar[str] = "swept sine"

@@ -49,15 +49,7 @@ class RecordedInput(Input):
 
 
 def load_record(path: str | Path, time_scale: float = 1.0) -> RecordedInput:
-    """Read a record.
-
-    Raises `DatasetError` or `ColumnError` or `UnitError` or `RecordError` if the file cannot be read, states no unit,
-    or has unequal steps.
-
-    `path`: CSV with time_s and one of acceleration_m_s2, acceleration_g (1 g = 9.81 m/s²), height_m; `time_scale`:
-    factor by which
-    it is played faster than recorded.
-    """
+    """Read a CSV with time_s and acceleration_m_s2, acceleration_g (9.81 m/s²) or height_m; raises `InputError`."""
     path = Path(path)
     table = read_table(path, "give a CSV with time_s and acceleration_m_s2")
     table = table.rename({column: column.strip().lstrip("\ufeff") for column in table.columns})
