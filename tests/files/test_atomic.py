@@ -11,19 +11,19 @@ from support.command import mrdamper
 from support.forked import forked
 
 from mrdamper.data import atomic
-from mrdamper.data.atomic import MADE, ResultRecord, publish, require_writable, write_file, write_folder, write_into
+from mrdamper.data.atomic import (
+    MADE,
+    ResultRecord,
+    publish,
+    require_writable,
+    write_file,
+    write_folder,
+    write_into,
+    write_result,
+)
 from mrdamper.errors import InputError, OutputError, ResourceError, resource_error
 
 posix = pytest.mark.skipif(os.name != "posix", reason="kills and locks as POSIX knows them")
-
-
-def result(names, text):
-    def fill(work):
-        (work / "figures").mkdir()
-        for name in names:
-            (work / name).write_text(text)
-
-    return fill
 
 
 def files(folder):
@@ -33,13 +33,13 @@ def files(folder):
 @pytest.mark.parametrize("here", [False, True], ids=["exchanged", "file by file"])
 def test_a_result_takes_the_place_of_the_earlier_one_and_files_of_others_stay(tmp_path, monkeypatch, here):
     out = tmp_path / "out"
-    publish(out, "page", result(["page", "model-a.json", "model-b.json", "figures/a.svg"], "old"))
+    publish(out, dict.fromkeys(["page", "model-a.json", "model-b.json", "figures/a.svg"], "old"))
     (out / "mine.txt").write_text("mine")
     (out / "figures" / "mine.svg").write_text("mine")
     if here:
         monkeypatch.chdir(out)
     record = ResultRecord(seconds={"in all": 1.5})
-    listed = publish(out, "page", result(["page", "model.json", "figures/b.svg"], "new"), record)
+    listed = publish(out, dict.fromkeys(["page", "model.json", "figures/b.svg"], "new"), record)
     assert [p.relative_to(out).as_posix() for p in listed] == ["page", "model.json", "figures/b.svg"]
     found = files(out)
     written = {"files": ["figures/b.svg", "model.json", "page"], "seconds": {"in all": 1.5}, "processes": None}
@@ -50,15 +50,16 @@ def test_a_result_takes_the_place_of_the_earlier_one_and_files_of_others_stay(tm
 
 
 def test_an_error_leaves_what_stood_there(tmp_path):
-    publish(tmp_path / "out", "page", result(["page"], "old"))
+    publish(tmp_path / "out", dict.fromkeys(["page"], "old"))
     before = files(tmp_path / "out")
 
-    def fill(work):
-        (work / "page").write_text("new")
-        raise RuntimeError("a fault")
+    def fail():
+        with write_result(tmp_path / "out") as work:
+            (work / "page").write_text("new")
+            raise RuntimeError("a fault")
 
     with pytest.raises(RuntimeError):
-        publish(tmp_path / "out", "page", fill)
+        fail()
     assert files(tmp_path) == {f"out/{name}": text for name, text in before.items()}
 
 
@@ -77,7 +78,7 @@ def written_until(at, out):
     for name in ("mkdir", "rename", "replace", "link", "fsync", "unlink", "rmdir"):
         setattr(os, name, counted(getattr(os, name)))
     atomic._exchange = counted(atomic._exchange)
-    publish(out, "page", result(["page", "model.json", "figures/a.svg"], "new"))
+    publish(out, dict.fromkeys(["page", "model.json", "figures/a.svg"], "new"))
 
 
 @posix
@@ -86,7 +87,7 @@ def test_killed_at_any_step_it_is_the_old_result_or_the_new_one(tmp_path):
     seen = set()
     while True:
         at += 1
-        publish(out, "page", result(["page", "model-a.json", "figures/b.svg"], "old"))
+        publish(out, dict.fromkeys(["page", "model-a.json", "figures/b.svg"], "old"))
         (out / "mine.txt").write_text("mine")
         ended = forked(written_until, at, out)
         found = files(out)
@@ -101,7 +102,7 @@ def test_killed_at_any_step_it_is_the_old_result_or_the_new_one(tmp_path):
         assert ended == -signal.SIGKILL
     assert at > 10
     assert seen == {True, False}
-    publish(out, "page", result(["page"], "old"))  # sweeps what the killed ones left
+    publish(out, dict.fromkeys(["page"], "old"))  # sweeps what the killed ones left
     assert os.listdir(tmp_path) == ["out"]  # noqa: PTH208
 
 
@@ -174,8 +175,8 @@ def test_what_cannot_be_a_folder_is_refused_with_a_code(tmp_path, place):
 
 def test_without_an_exchange_the_files_move_one_by_one(tmp_path, monkeypatch):
     monkeypatch.setattr(atomic, "_exchange", lambda one, other: False)
-    publish(tmp_path / "out", "page", result(["page", "a"], "old"))
-    publish(tmp_path / "out", "page", result(["page"], "new"))
+    publish(tmp_path / "out", dict.fromkeys(["page", "a"], "old"))
+    publish(tmp_path / "out", dict.fromkeys(["page"], "new"))
     assert {k: v for k, v in files(tmp_path / "out").items() if k != MADE} == {"page": "new"}
 
 

@@ -187,10 +187,12 @@ def test_one_train_run_is_not_enough(bundled):
 
 def test_a_failed_report_leaves_nothing(small, tmp_path, monkeypatch):
     monkeypatch.setattr("mrdamper.report.study._draw", lambda *a, **k: {})
-    monkeypatch.setattr("mrdamper.report.study.save_model", lambda *a: (_ for _ in ()).throw(RuntimeError("halt")))
+    monkeypatch.setattr("mrdamper.report.study.render_page", lambda *a, **k: "page")
+    monkeypatch.setattr("mrdamper.report.study.dump_model", lambda *a: (_ for _ in ()).throw(RuntimeError("halt")))
     with pytest.raises(RuntimeError, match="halt"):
         write_study(small, tmp_path / "out")
     assert list(tmp_path.iterdir()) == []
+    monkeypatch.setattr("mrdamper.report.study.dump_model", lambda *a: "model")
     (tmp_path / "file").write_text("x")
     with pytest.raises(OutputError):
         write_study(small, tmp_path / "file" / "out")

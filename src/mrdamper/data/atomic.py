@@ -14,7 +14,7 @@ import json
 import os
 import shutil
 import sys
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -96,14 +96,14 @@ def write_result(folder: str | Path, record: ResultRecord | None = None) -> Gene
         _put(work, final, _earlier(final))
 
 
-def publish(
-    folder: str | Path, first: str, fill: Callable[[Path], None], record: ResultRecord | None = None
-) -> list[Path]:
-    """Have `fill` write a result as `write_result` does; return the files, the page `first` before the others."""
+def publish(folder: str | Path, files: Mapping[str, str | bytes], record: ResultRecord | None = None) -> list[Path]:
+    """Write a result, given by the contents of its files, as `write_result` does; return the paths, the first first."""
     with write_result(folder, record) as work:
-        fill(work)
-        written = [p.relative_to(work) for p in work.rglob("*") if p.is_file()]
-    return [Path(folder) / p for p in sorted(written, key=lambda p: (p.name != first, len(p.parts), str(p)))]
+        for name, content in files.items():
+            (work / name).parent.mkdir(exist_ok=True)
+            (work / name).write_bytes(content.encode() if isinstance(content, str) else content)
+    page, *others = map(Path, files)
+    return [Path(folder) / p for p in (page, *sorted(others, key=lambda p: (len(p.parts), str(p))))]
 
 
 @contextmanager

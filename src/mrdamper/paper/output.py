@@ -26,7 +26,7 @@ from mrdamper.paper.figures import FIGURES, NO_SEEDS, caption, pictures
 from mrdamper.paper.options import ALI, CONSISTENT, DIRECT, LITERAL, TRADITIONAL
 from mrdamper.paper.results import Reproduction, cost_per_run, rate_rows
 from mrdamper.report.page import made_from, render_page
-from mrdamper.report.plots.style import Picture, save_picture
+from mrdamper.report.plots.style import Picture, picture_files
 from mrdamper.report.tables import identification_rows
 from mrdamper.study.processes import IN_PROCESS, Processes
 
@@ -51,35 +51,25 @@ def write_reproduction(
     tables, absent = all_tables(study, claims)
     notes = [f"Figure {name} is not drawn: {drawn[name]}." for name in names if isinstance(drawn[name], str)]
     notes += [f"Table {name} is not made: {why}." for name, why in absent.items()]
-
-    def fill(work: Path) -> None:
-        for part in ("figures", "tables"):
-            (work / part).mkdir()
-        shown = {
-            name: (caption(name), save_picture(picture, work / "figures" / name))
-            for name in names
-            if not isinstance(picture := drawn[name], str)
-        }
-        for name, rows in (tables | {"seconds": time_rows(study)}).items():
-            (work / "tables" / f"{name}.csv").write_text(csv_text(rows), encoding="utf-8")
-        page = render_page(
-            "reproduction.html.j2",
-            "The method of Qian et al. 2024, claim by claim",
-            f"{made_from(study.dataset)}. "
-            "Reference: Qian, Wang, Jiang, Zhang, Zhai, Wang (2024), Actuators 13(8), 297.",
-            study=study,
-            claims=claims,
-            tables=tables,
-            numbered=[(name, NUMBERED[name]) for name in NUMBERED if name in tables],
-            pictures=shown,
-            notes=(*study.notes, *notes),
-            best=study.best,
-            synthetic=study.rig is not None,
-        )
-        (work / "reproduction.html").write_text(page, encoding="utf-8")
-
+    shown = {name: picture for name in names if not isinstance(picture := drawn[name], str)}
+    page = render_page(
+        "reproduction.html.j2",
+        "The method of Qian et al. 2024, claim by claim",
+        f"{made_from(study.dataset)}. Reference: Qian, Wang, Jiang, Zhang, Zhai, Wang (2024), Actuators 13(8), 297.",
+        study=study,
+        claims=claims,
+        tables=tables,
+        numbered=[(name, NUMBERED[name]) for name in NUMBERED if name in tables],
+        pictures={name: (caption(name), picture["svg"]) for name, picture in shown.items()},
+        notes=(*study.notes, *notes),
+        best=study.best,
+        synthetic=study.rig is not None,
+    )
+    every = tables | {"seconds": time_rows(study)}
+    files = {"reproduction.html": page, **{f"tables/{name}.csv": csv_text(rows) for name, rows in every.items()}}
     took = {method.recipe.title: method.seconds for method in study.contenders}
-    written = publish(folder, "reproduction.html", fill, ResultRecord(seconds={"in all": study.seconds, **took}))
+    record = ResultRecord(seconds={"in all": study.seconds, **took})
+    written = publish(folder, {**files, **picture_files(shown)}, record)
     progress("written", 1.0)
     return written
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mrdamper.dampers.model_file import save_model
+from mrdamper.dampers.model_file import dump_model
 from mrdamper.data import Run
 from mrdamper.data.atomic import ResultRecord, publish
 from mrdamper.data.encoding import csv_text, file_names, finite
@@ -19,7 +19,7 @@ from mrdamper.data.wording import counted, number
 from mrdamper.report.page import made_from, render_page
 from mrdamper.report.plots.comparison import overlaid_loops, ranking
 from mrdamper.report.plots.cycle import spread_out
-from mrdamper.report.plots.style import save_figure
+from mrdamper.report.plots.style import Picture, picture_files, picture_of
 from mrdamper.report.summary import omission_lines
 from mrdamper.report.tables import score_rows
 from mrdamper.study.comparison import RANKING, Comparison, RigComparison
@@ -32,29 +32,28 @@ def write_comparison(
     comparison: Comparison, folder: str | Path, progress: Progress = silent, *, png: bool = False
 ) -> list[Path]:
     """Write the comparison atomically, its figures with `png` also as PNG; return the files, the page first."""
-
-    def fill(work: Path) -> None:
-        (work / "figures").mkdir()
-        (work / "models").mkdir()
-        chapters, parts = [], file_names(rig.rig for rig in comparison.rigs)
-        for place, rig in enumerate(comparison.rigs):
-            progress(f"{rig.rig or 'rig'}: figures", place / len(comparison.rigs))
-            suffix = f"-{parts[rig.rig]}" if len(comparison.rigs) > 1 else ""
-            chapters.append(_chapter(rig, work / "figures", suffix, png))
-            for entry in rig.entries:
-                save_model(entry.damper, work / "models" / f"{entry.recipe.name.replace(':', '-')}{suffix}.json")
-        footer = f"{made_from(comparison.dataset)}."
-        title = f"MR damper models compared: {', '.join(r.rig for r in comparison.rigs) or comparison.dataset.name}"
-        page = render_page("comparison.html.j2", title, footer, chapters=chapters, ranking=RANKING)
-        (work / "comparison.html").write_text(page, encoding="utf-8")
-        rows = [{k: v for k, v in row.items() if k != "seconds"} for row in summary_rows(comparison)]
-        (work / "comparison.csv").write_text(csv_text(rows), encoding="utf-8")
-        (work / "runs.csv").write_text(csv_text(run_rows(comparison)), encoding="utf-8")
-        (work / "comparison.json").write_text(json.dumps(rows, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-
+    chapters, parts = [], file_names(rig.rig for rig in comparison.rigs)
+    models, figures = {}, {}
+    for place, rig in enumerate(comparison.rigs):
+        progress(f"{rig.rig or 'rig'}: figures", place / len(comparison.rigs))
+        suffix = f"-{parts[rig.rig]}" if len(comparison.rigs) > 1 else ""
+        pictures = _pictures(rig, ("png",) if png else ())
+        figures |= picture_files(pictures, suffix)
+        chapters.append(_chapter(rig, pictures))
+        for entry in rig.entries:
+            models[f"models/{entry.recipe.name.replace(':', '-')}{suffix}.json"] = dump_model(entry.damper)
+    footer = f"{made_from(comparison.dataset)}."
+    title = f"MR damper models compared: {', '.join(r.rig for r in comparison.rigs) or comparison.dataset.name}"
+    rows = [{k: v for k, v in row.items() if k != "seconds"} for row in summary_rows(comparison)]
+    files = {
+        "comparison.html": render_page("comparison.html.j2", title, footer, chapters=chapters, ranking=RANKING),
+        "comparison.csv": csv_text(rows),
+        "runs.csv": csv_text(run_rows(comparison)),
+        "comparison.json": json.dumps(rows, indent=1, ensure_ascii=False) + "\n",
+    }
     took = {rig.dataset.name: {entry.recipe.name: entry.seconds for entry in rig.entries} for rig in comparison.rigs}
     record = ResultRecord(seconds={"in all": comparison.seconds, **took}, processes=comparison.jobs)
-    written = publish(folder, "comparison.html", fill, record)
+    written = publish(folder, {**files, **models, **figures}, record)
     progress("written", 1.0)
     return written
 
@@ -120,11 +119,14 @@ def _reason(entry: RecipeResult, entries: Sequence[RecipeResult]) -> str:
     return text
 
 
-def _chapter(rig: RigComparison, folder: Path, suffix: str, png: bool) -> dict[str, Any]:
+def _pictures(rig: RigComparison, also: Sequence[str]) -> dict[str, Picture]:
     scores = {e.title: (e.train.median(), e.cross_validated.median(), e.validation.median()) for e in rig.entries}
-    runs = _shown(rig)
     best = {entry.title: entry.damper for entry in rig.entries[:_OVERLAID]}
-    figures = {"ranking": ranking(scores), "loops": overlaid_loops(runs, best)}
+    figures = {"ranking": ranking(scores), "loops": overlaid_loops(_shown(rig), best)}
+    return {name: picture_of(figure, also) for name, figure in figures.items()}
+
+
+def _chapter(rig: RigComparison, pictures: Mapping[str, Picture]) -> dict[str, Any]:
     first = rig.entries[0]
     return {
         "rig": rig.dataset.name,
@@ -137,13 +139,10 @@ def _chapter(rig: RigComparison, folder: Path, suffix: str, png: bool) -> dict[s
             f"peak-to-peak force, among {counted(len(rig.entries), 'model')}."
         ),
         "loops_caption": (
-            f"Last cycle of the {'validation' if runs[0].split == 'validate' else 'identification'} runs; "
-            f"the best {counted(len(best), 'model')}."
+            f"Last cycle of the {'validation' if _shown(rig)[0].split == 'validate' else 'identification'} runs; "
+            f"the best {counted(len(rig.entries[:_OVERLAID]), 'model')}."
         ),
-        "figures": {
-            name: save_figure(figure, folder / f"{name}{suffix}", ("png",) if png else ())
-            for name, figure in figures.items()
-        },
+        "figures": {name: picture["svg"] for name, picture in pictures.items()},
     }
 
 

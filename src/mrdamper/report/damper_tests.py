@@ -21,7 +21,7 @@ from mrdamper.report.about import About, Limit
 from mrdamper.report.page import made_from, plain, render_page
 from mrdamper.report.plots.characteristics import continuous_velocity_plot, figures_over_current, peak_velocity_plot
 from mrdamper.report.plots.figure import Figure
-from mrdamper.report.plots.style import picture_of, save_picture
+from mrdamper.report.plots.style import picture_files, picture_of
 from mrdamper.study.usable_runs import characterise_usable
 
 _SOURCES = ("source", "file", "source_file")  # keys of a run's notes that name its source
@@ -56,30 +56,27 @@ def write_test_report(
     facts = facts_of_tests(characteristics, ladder, limits)
     first = next(iter(specimens.values()))
     about = about or About()
-
-    def fill(work: Path) -> None:
-        (work / "figures").mkdir()
-        also = ("pdf", "png") if png else ("pdf",)
-        figures = figures_of_tests(first, characteristics, limits)
-        pictures = {key: picture_of(figure, also) for key, figure in figures.items()}
-        saved = {key: save_picture(picture, work / "figures" / key) for key, picture in pictures.items()}
-        page = render_page(
-            "tests.html.j2",
-            about.title or f"Damper test report: {', '.join(characteristics)}",
-            made_from(*specimens.values()) + ".",
-            about=about,
-            provenance=provenance(specimens),
-            lead=facts["summary"],
-            t=facts,
-            pictures=saved,
-            passed_over=passed_over,
-        )
-        (work / "report.html").write_text(page, encoding="utf-8")
-        (work / "report.pdf").write_bytes(pdf_of(page, {key: p["pdf"] for key, p in pictures.items()}, paper))
-        (work / "forces.csv").write_text(csv_text(force_rows(facts)), encoding="utf-8")
-        (work / "tests.csv").write_text(csv_text(_test_rows(characteristics)), encoding="utf-8")
-
-    return publish(folder, "report.html", fill)
+    also = ("pdf", "png") if png else ("pdf",)
+    figures = figures_of_tests(first, characteristics, limits)
+    pictures = {key: picture_of(figure, also) for key, figure in figures.items()}
+    page = render_page(
+        "tests.html.j2",
+        about.title or f"Damper test report: {', '.join(characteristics)}",
+        made_from(*specimens.values()) + ".",
+        about=about,
+        provenance=provenance(specimens),
+        lead=facts["summary"],
+        t=facts,
+        pictures={key: picture["svg"] for key, picture in pictures.items()},
+        passed_over=passed_over,
+    )
+    files = {
+        "report.html": page,
+        "report.pdf": pdf_of(page, {key: picture["pdf"] for key, picture in pictures.items()}, paper),
+        "forces.csv": csv_text(force_rows(facts)),
+        "tests.csv": csv_text(_test_rows(characteristics)),
+    }
+    return publish(folder, {**files, **picture_files(pictures)})
 
 
 def figures_of_tests(

@@ -14,7 +14,7 @@ from mrdamper.data.encoding import csv_text, rows_of
 from mrdamper.data.wording import number
 from mrdamper.report.page import render_page
 from mrdamper.report.plots.simulation import MOST_DRAWN, histories, spectra
-from mrdamper.report.plots.style import save_figure
+from mrdamper.report.plots.style import picture_files, picture_of
 from mrdamper.systems.controller_comparison import ControllerComparison
 from mrdamper.systems.measures import benchmark_ratios, measures
 from mrdamper.systems.monte_carlo import LEVELS, Bands
@@ -49,41 +49,31 @@ def write_simulation(
     if beside is not None:
         runs |= beside.runs
     spread = {name: bands.quantiles()[name] for name in bands.measures} if bands else {}
-
-    def fill(work: Path) -> None:
-        (work / "figures").mkdir()
-        figures = {
-            "histories": save_figure(histories(runs), work / "figures/histories"),
-            "spectra": save_figure(spectra(runs), work / "figures/spectra"),
-        }
-        columns = {title: measures(run) for title, run in runs.items()}
-        names = list(dict.fromkeys(name for column in columns.values() for name in column))
-        shares = {title: beside.share(title) for title in beside.runs} if beside else {}
-        page = render_page(
-            "simulation.html.j2",
-            done.headline,
-            f"mrdamper {version('mrdamper')}; step {number(1e3 * done.step, 3)} ms",
-            done=done,
-            columns=columns,
-            names={name: _readable(name) for name in names},
-            facts=facts,
-            drawn=min(len(runs), MOST_DRAWN),
-            shares=shares,
-            bands=bands,
-            spread=spread,
-            ratios=_ratios(runs, beside),
-            figures=figures,
-        )
-        (work / "simulation.html").write_text(page, encoding="utf-8")
-        rows = [{"measure": name, **{title: column.get(name) for title, column in columns.items()}} for name in names]
-        for row in rows if bands else []:
-            row |= dict(zip((f"{100 * level:g} %" for level in LEVELS), spread[row["measure"]], strict=True))
-        (work / "measures.csv").write_text(csv_text(rows), encoding="utf-8")
-        every = slice(None, None, -(-done.time.size // _ROWS))
-        samples = rows_of({name: column[every] for name, column in done.table.items()})
-        (work / "histories.csv").write_text(csv_text(samples), encoding="utf-8")
-
-    return publish(folder, "simulation.html", fill)
+    pictures = {"histories": picture_of(histories(runs)), "spectra": picture_of(spectra(runs))}
+    columns = {title: measures(run) for title, run in runs.items()}
+    names = list(dict.fromkeys(name for column in columns.values() for name in column))
+    page = render_page(
+        "simulation.html.j2",
+        done.headline,
+        f"mrdamper {version('mrdamper')}; step {number(1e3 * done.step, 3)} ms",
+        done=done,
+        columns=columns,
+        names={name: _readable(name) for name in names},
+        facts=facts,
+        drawn=min(len(runs), MOST_DRAWN),
+        shares={title: beside.share(title) for title in beside.runs} if beside else {},
+        bands=bands,
+        spread=spread,
+        ratios=_ratios(runs, beside),
+        figures={name: picture["svg"] for name, picture in pictures.items()},
+    )
+    rows = [{"measure": name, **{title: column.get(name) for title, column in columns.items()}} for name in names]
+    for row in rows if bands else []:
+        row |= dict(zip((f"{100 * level:g} %" for level in LEVELS), spread[row["measure"]], strict=True))
+    every = slice(None, None, -(-done.time.size // _ROWS))
+    samples = rows_of({name: column[every] for name, column in done.table.items()})
+    files = {"simulation.html": page, "measures.csv": csv_text(rows), "histories.csv": csv_text(samples)}
+    return publish(folder, {**files, **picture_files(pictures)})
 
 
 def _readable(name: str) -> tuple[str, str, float]:

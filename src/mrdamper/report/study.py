@@ -11,7 +11,7 @@ import numpy as np
 
 from mrdamper.dampers.bands import scope
 from mrdamper.dampers.joint import JointFit
-from mrdamper.dampers.model_file import save_model
+from mrdamper.dampers.model_file import dump_model
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.dampers.uncertainty import table
 from mrdamper.data.atomic import ResultRecord, publish
@@ -40,7 +40,7 @@ from mrdamper.report.plots.model import (
 )
 from mrdamper.report.plots.reversal import force_since_reversal
 from mrdamper.report.plots.rig_tests import measured_loops, test_analysis, test_matrix
-from mrdamper.report.plots.style import MOST_NAMED, Picture, picture_of, powered, save_picture
+from mrdamper.report.plots.style import MOST_NAMED, Picture, picture_files, picture_of, powered
 from mrdamper.report.summary import error_sentence, omission_lines
 from mrdamper.report.tables import identification_rows, score_rows
 from mrdamper.study.processes import IN_PROCESS, Processes
@@ -79,36 +79,28 @@ def write_study(
     # Figures as SVG alone cost less here than sending the study to a process, with what this one knows of its runs.
     painters = processes if also else IN_PROCESS
     drawn = painters.map(partial(_draw, also=tuple(also), limits=limits), study.rigs, progress)
+    chapters, parts = [], file_names(rig.rig for rig in study.rigs)
+    models, figures, vectors, forces = {}, {}, {}, []
+    for number, (rig, pictures) in enumerate(zip(study.rigs, drawn, strict=True), 1):
+        suffix = f"-{parts[rig.rig]}" if len(study.rigs) > 1 else ""
+        models[f"model{suffix}.json"] = dump_model(rig.damper)
+        figures |= picture_files(pictures, suffix)
+        vectors |= {f"rig-{number}-{name}": picture["pdf"] for name, picture in pictures.items() if "pdf" in picture}
+        chapters.append({**_chapter(rig, pictures, limits), "key": f"rig-{number}"})
+        forces += force_rows(chapters[-1]["measured"] or {})
+    footer = f"{made_from(study.dataset)}."
+    title = f"MR damper study: {', '.join(r.rig for r in study.rigs) or study.dataset.name}"
+    origin = provenance({rig.dataset.name: rig.dataset for rig in study.rigs})
+    page = render_page("study.html.j2", head.title or title, footer, chapters=chapters, about=head, provenance=origin)
+    files: dict[str, str | bytes] = {"report.html": page, **models, **figures}
+    if "pdf" in also:
+        from mrdamper.report.pdf import pdf_of
 
-    def fill(work: Path) -> None:
-        (work / "figures").mkdir()
-        chapters, parts = [], file_names(rig.rig for rig in study.rigs)
-        vectors, forces = {}, []
-        for rig, pictures in zip(study.rigs, drawn, strict=True):
-            suffix = f"-{parts[rig.rig]}" if len(study.rigs) > 1 else ""
-            stems = {name: work / "figures" / f"{name}{suffix}" for name in pictures}
-            saved = {name: save_picture(picture, stems[name]) for name, picture in pictures.items()}
-            save_model(rig.damper, work / f"model{suffix}.json")
-            key = f"rig-{len(chapters) + 1}"
-            vectors |= {f"{key}-{name}": p["pdf"] for name, p in pictures.items() if "pdf" in p}
-            chapters.append({**_chapter(rig, saved, limits), "key": key})
-            forces += force_rows(chapters[-1]["measured"] or {})
-        footer = f"{made_from(study.dataset)}."
-        title = f"MR damper study: {', '.join(r.rig for r in study.rigs) or study.dataset.name}"
-        origin = provenance({rig.dataset.name: rig.dataset for rig in study.rigs})
-        page = render_page(
-            "study.html.j2", head.title or title, footer, chapters=chapters, about=head, provenance=origin
-        )
-        (work / "report.html").write_text(page, encoding="utf-8")
-        if "pdf" in also:
-            from mrdamper.report.pdf import pdf_of
-
-            (work / "report.pdf").write_bytes(pdf_of(page, vectors, paper))
-        for name, rows in (_tables(study) | ({"forces": forces} if forces else {})).items():
-            (work / f"{name}.csv").write_text(csv_text(rows), encoding="utf-8")
-
+        files["report.pdf"] = pdf_of(page, vectors, paper)
+    tables = _tables(study) | ({"forces": forces} if forces else {})
+    files |= {f"{name}.csv": csv_text(rows) for name, rows in tables.items()}
     took = {rig.dataset.name: {c.recipe.name: c.seconds for c in rig.candidates} for rig in study.rigs}
-    written = publish(folder, "report.html", fill, ResultRecord(seconds={"in all": study.seconds, **took}))
+    written = publish(folder, files, ResultRecord(seconds={"in all": study.seconds, **took}))
     progress("written", 1.0)
     return written
 
@@ -180,7 +172,7 @@ def _measured(rig: RigStudy) -> dict[str, Characteristics]:
         return {}
 
 
-def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limit]) -> dict[str, Any]:
+def _chapter(rig: RigStudy, pictures: Mapping[str, Picture], limits: Sequence[Limit]) -> dict[str, Any]:
     chosen = rig.chosen
     mapped, functions = _mapped(rig)
     floors = [run.repeatability for run in rig.dataset if run.repeatability is not None]
@@ -215,7 +207,7 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limi
             if chosen.damper.uncertainty
             else ""
         ),
-        "figures": pictures,
+        "figures": {name: picture["svg"] for name, picture in pictures.items()},
     }
 
 

@@ -74,18 +74,18 @@ def uncertainty(
 
 
 def _write(out: Path, rows: Rows, curves: list[LikelihoodProfile], drawn: Samples | None, level: float) -> None:
-    from mrdamper.data.atomic import write_result
+    from mrdamper.data.atomic import publish
     from mrdamper.data.encoding import csv_text
-    from mrdamper.report.plots.style import save_figure
+    from mrdamper.report.plots.style import picture_files, picture_of
     from mrdamper.report.plots.uncertainty import corner, profile_curves, quantiles
 
-    with write_result(out) as folder:
-        (folder / "parameters.csv").write_text(csv_text(rows), encoding="utf-8")
-        if curves:
-            save_figure(profile_curves(curves), folder / "profile")
-        if drawn is not None:
-            save_figure(corner(drawn), folder / "corner")
-            (folder / "samples.csv").write_text(csv_text(quantiles(drawn, level)), encoding="utf-8")
+    tables, pictures = {"parameters.csv": csv_text(rows)}, {}
+    if curves:
+        pictures["profile"] = picture_of(profile_curves(curves))
+    if drawn is not None:
+        pictures["corner"] = picture_of(corner(drawn))
+        tables["samples.csv"] = csv_text(quantiles(drawn, level))
+    publish(out, tables | picture_files(pictures, folder=""))
 
 
 def _used(data: Path | None, rig: str) -> list[Run]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -78,11 +77,10 @@ def picture_of(figure: Figure, also: Sequence[str] = ()) -> Picture:
     return {kind: drawing.file(kind) for kind in ("svg", *also)} | {"csv": figure_data(figure).encode()}
 
 
-def save_picture(picture: Picture, stem: Path) -> bytes:
-    """Write the files of a figure; return the SVG."""
-    for kind, data in picture.items():
-        stem.with_name(f"{stem.name}.{kind}").write_bytes(data)
-    return picture["svg"]
+def picture_files(pictures: Mapping[str, Picture], suffix: str = "", folder: str = "figures/") -> dict[str, bytes]:
+    """Return the files of figures by their paths; the names end in a suffix."""
+    files = ((f"{folder}{name}{suffix}", picture) for name, picture in pictures.items())
+    return {f"{stem}.{kind}": data for stem, picture in files for kind, data in picture.items()}
 
 
 def figure_data(figure: Figure) -> str:
@@ -95,8 +93,3 @@ def figure_data(figure: Figure) -> str:
             begin = csv_text([about]).removeprefix(head).removesuffix("\n")
             rows += [f"{begin},{x!r},{y!r}\n" for x, y in zip(one.x.tolist(), one.y.tolist(), strict=True)]
     return "".join(rows)
-
-
-def save_figure(figure: Figure, stem: Path, also: Sequence[str] = ()) -> bytes:
-    """Write a figure as SVG and CSV, and in further formats; returns the SVG."""
-    return save_picture(picture_of(figure, also), stem)
