@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 import urllib.request
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -19,7 +20,7 @@ from mrdamper.web.jobs import Job
 
 
 def run(task, *arguments, conclude=lambda result: {"result": result}):
-    return Job("job1", "test", task, arguments, conclude).start()
+    return Job("job1", "test", partial(task, *arguments), conclude).start()
 
 
 def ended(job, seconds=30):
@@ -136,9 +137,9 @@ def test_workers_end_with_an_app_that_was_killed(tmp_path):
     The script has no guard: a worker must not run it once more.
     """
     code = (
-        "from web import slow_tasks; from mrdamper.web.jobs import Job; import sys, time\n"
+        "from functools import partial; from web import slow_tasks; from mrdamper.web.jobs import Job; import sys, time\n"
         "open(sys.argv[1] + '/begun', 'a').write('x')\n"
-        "Job('job1', 'test', slow_tasks.sleep_with_child, (sys.argv[1],), lambda r: {}).start(); time.sleep(20)\n"
+        "Job('job1', 'test', partial(slow_tasks.sleep_with_child, sys.argv[1]), lambda r: {}).start(); time.sleep(20)\n"
     )
     script = tmp_path / "app.py"
     script.write_text(code)
@@ -186,7 +187,7 @@ def test_work_of_one_kind_takes_the_place_of_the_same_kind_only(client, app, loa
 
 
 def test_a_stored_result_is_used_without_a_worker():
-    job = ended(Job("job1", "test", slow_tasks.break_down, (), lambda result: {"result": result}, lambda: 7).start())
+    job = ended(Job("job1", "test", slow_tasks.break_down, lambda result: {"result": result}, lambda: 7).start())
     assert (job.state, job.result, job._process) == ("done", {"result": 7}, None)
 
 

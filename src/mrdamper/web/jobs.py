@@ -1,6 +1,6 @@
 """Jobs: long work in a process of its own, with progress, that ends when it is cancelled.
 
-A job runs a module-level function `task(progress, *arguments)` of `tasks.py`; `progress(step, share)` reports.
+A job calls `task(progress=progress)`, a module-level function or `partial` of one; `progress(step, share)` reports.
 """
 
 from __future__ import annotations
@@ -32,7 +32,6 @@ class Job:
     key: str
     kind: str
     task: Callable[..., Any]
-    arguments: tuple[Any, ...]
     conclude: Callable[[Any], dict[str, Any]]  # stores the result of the task, and returns that for the page
     stored: Callable[[], Any] = lambda: None  # an earlier result of the same task, looked up when it is this job's turn
     state: str = "waiting"  # or "running", "done", "refused" (invalid input), "failed" (internal error), "cancelled"
@@ -96,7 +95,7 @@ class Job:
         self.state, self.step = "running", "starting"
         reports, sender = SPAWNED.Pipe(duplex=False)
         with self._starting:
-            self._process = SPAWNED.Process(target=_work, args=(sender, self.task, self.arguments))
+            self._process = SPAWNED.Process(target=_work, args=(sender, self.task))
             self._process.start()
         sender.close()
         if self._stop.is_set():  # cancelled during the start
@@ -166,7 +165,7 @@ def _end_group(process: Any) -> None:
         process.terminate()  # no process groups on this system, or the worker has none yet
 
 
-def _work(pipe: Connection, task: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
+def _work(pipe: Connection, task: Callable[..., Any]) -> None:
     if hasattr(os, "setsid"):
         os.setsid()  # a group of its own, so that cancelling ends the processes of the task too
         os.nice(_NICENESS)
@@ -181,7 +180,7 @@ def _work(pipe: Connection, task: Callable[..., Any], arguments: tuple[Any, ...]
             pipe.send(("progress", step, float(share)))
 
     try:
-        pipe.send(("done", task(progress, *arguments)))
+        pipe.send(("done", task(progress=progress)))
     except InputError as error:
         pipe.send(("refused", error_parts(error)))
     except (BrokenPipeError, KeyboardInterrupt):

@@ -153,7 +153,6 @@ class Session:
         self,
         kind: str,
         task: Callable[..., Any],
-        arguments: tuple[Any, ...],
         conclude: Callable[[Any], dict[str, Any]],
         stored: Callable[[], Any] = lambda: None,
     ) -> dict[str, Any]:
@@ -161,7 +160,7 @@ class Session:
         if before := self.newest.get(kind):
             before.cancel()
         self.jobs = {key: job for key, job in self.jobs.items() if not job.ended}
-        job = Job(self.key("job"), kind, task, arguments, conclude, stored)
+        job = Job(self.key("job"), kind, task, conclude, stored)
         self.jobs[job.key] = self.newest[kind] = job.start()
         return job.report()
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from mrdamper.dampers.base import Damper
@@ -33,13 +32,12 @@ from mrdamper.study.workflow import Study, run_study
 
 if TYPE_CHECKING:
     from mrdamper.report.about import About
-    from mrdamper.study.comparison import Comparison
 
 JOINT = "joint"
 FUNCTIONS = "functions"
 
 
-def study(progress: Progress, dataset: Dataset, folder: Path, about: About | None = None) -> tuple[Study, list[Path]]:
+def study(dataset: Dataset, folder: Path, about: About | None, progress: Progress) -> tuple[Study, list[Path]]:
     """Run the whole study, and write its report, models, tables and figures into a folder."""
     from mrdamper.report.study import write_study
 
@@ -49,14 +47,14 @@ def study(progress: Progress, dataset: Dataset, folder: Path, about: About | Non
 
 
 def identify_rig(
-    progress: Progress,
     dataset: Dataset,
     run_ids: Sequence[str],
     model: str,
     method: str,
     over: str,
-    free: Sequence[str] = (),
-    fixed: Mapping[str, float] = MappingProxyType({}),
+    free: Sequence[str],
+    fixed: Mapping[str, float],
+    progress: Progress,
 ) -> tuple[tuple[Identification, ...], RecipeResult | str, dict[str, str]]:
     """Identify a model from runs of one rig, then over their conditions.
 
@@ -90,21 +88,7 @@ def identify_rig(
     return tuple(identifications), replace(scored, damper=estimate_uncertainty(scored.damper, runs)), refused
 
 
-def compare_models(progress: Progress, dataset: Dataset, names: Sequence[str], jobs: int) -> Comparison:
-    """Compare models on the same runs."""
-    from mrdamper.study.comparison import compare
-
-    return compare(dataset, names, jobs=jobs, progress=progress)
-
-
-def write_compared(progress: Progress, comparison: Comparison, folder: Path) -> list[Path]:
-    """Write a comparison as page, tables, figures and models into a folder."""
-    from mrdamper.report.comparison import write_comparison
-
-    return write_comparison(comparison, folder, progress)
-
-
-def export_damper(progress: Progress, damper: Damper, form: str, folder: Path) -> tuple[list[Path], tuple[str, ...]]:
+def export_damper(damper: Damper, form: str, folder: Path, progress: Progress) -> tuple[list[Path], tuple[str, ...]]:
     """Write a damper in an export format into a folder; returns the files and the notes of the exporter."""
     from mrdamper.exporters import exporter
     from mrdamper.exporters.base import write_export

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +12,13 @@ from fastapi.responses import Response
 from pydantic import BaseModel, Field
 
 from mrdamper.data.encoding import csv_text, finite
-from mrdamper.report.comparison import summary_rows
-from mrdamper.study.comparison import Comparison
+from mrdamper.report.comparison import summary_rows, write_comparison
+from mrdamper.study.comparison import Comparison, compare
 from mrdamper.study.recipe import STUDIED, WHOLE_DAMPER, RecipeResult, recipes
 from mrdamper.web.curves import measured_cycle, measured_window, predicted_on_run
 from mrdamper.web.responses import archive, download, frame
 from mrdamper.web.rig_table import screen_condition
 from mrdamper.web.sessions import OpenSession, Session
-from mrdamper.web.tasks import compare_models, write_compared
 
 router = APIRouter(prefix="/sessions/{session}/compare")
 
@@ -46,8 +46,8 @@ def choices(session: OpenSession) -> list[dict[str, Any]]:
 def start(choice: CompareRequest, session: OpenSession) -> dict[str, Any]:
     """Start a comparison on one rig."""
     jobs = max(1, (os.cpu_count() or 2) - 1)  # one processor remains for the page
-    arguments = session.table(choice.rig).dataset, choice.models, jobs
-    return session.start("compare", compare_models, arguments, lambda result: _conclude(session, choice.rig, result))
+    task = partial(compare, session.table(choice.rig).dataset, choice.models, jobs=jobs)
+    return session.start("compare", task, lambda result: _conclude(session, choice.rig, result))
 
 
 @router.get("/rigs/{rig}/runs/{key}")
@@ -79,7 +79,7 @@ def start_files(rig: int, session: OpenSession) -> dict[str, Any]:
         session.results[f"comparison.files.{rig}"] = written
         return {"files": len(written)}
 
-    return session.start("comparison files", write_compared, (_comparison(session, rig), folder), conclude)
+    return session.start("comparison files", partial(write_comparison, _comparison(session, rig), folder), conclude)
 
 
 @router.get("/rigs/{rig}/files.zip")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -114,7 +115,7 @@ def start_export(key: str, name: str, held: Held, session: OpenSession) -> dict[
         session.results[f"exported.{folder.name}"], notes = results
         return {"exported": folder.name, "notes": notes}
 
-    return session.start("export", export_damper, (damper, name, folder), conclude)
+    return session.start("export", partial(export_damper, damper, name, folder), conclude)
 
 
 @router.get("/exported/{key}")

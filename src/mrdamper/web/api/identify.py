@@ -97,7 +97,7 @@ def start_study(session: OpenSession, request: Request, head: Head = _EMPTY_HEAD
         return _conclude_study(session, *results)
 
     stored = partial(shared.find, key, folder) if shared is not None else lambda: None
-    return session.start("study", study, (session.dataset, folder, about), conclude, stored)
+    return session.start("study", partial(study, session.dataset, folder, about), conclude, stored)
 
 
 @router.post("/identify")
@@ -105,12 +105,9 @@ def start_identification(choice: IdentifyRequest, session: OpenSession) -> dict[
     """Start the identification of one model for one rig."""
     table = session.table(choice.rig)
     names = [table.row(key).run.id for key in choice.runs]
-    return session.start(
-        "identify",
-        identify_rig,
-        (table.dataset, names, choice.model, choice.method, choice.over, choice.free, choice.fixed),
-        lambda results: _conclude_identification(session, choice, *results),
-    )
+    settings = choice.model, choice.method, choice.over, choice.free, choice.fixed
+    task = partial(identify_rig, table.dataset, names, *settings)
+    return session.start("identify", task, lambda results: _conclude_identification(session, choice, *results))
 
 
 @router.get("/identified/runs/{number}")
