@@ -137,7 +137,8 @@ def test_workers_end_with_an_app_that_was_killed(tmp_path):
     The script has no guard: a worker must not run it once more.
     """
     code = (
-        "from functools import partial; from web import slow_tasks; from mrdamper.web.jobs import Job; import sys, time\n"
+        "import sys, time; from functools import partial\n"
+        "from web import slow_tasks; from mrdamper.web.jobs import Job\n"
         "open(sys.argv[1] + '/begun', 'a').write('x')\n"
         "Job('job1', 'test', partial(slow_tasks.sleep_with_child, sys.argv[1]), lambda r: {}).start(); time.sleep(20)\n"
     )

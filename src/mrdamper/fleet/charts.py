@@ -71,8 +71,6 @@ class Capability:
     low: float  # ends of its 95 % interval
     high: float
     way: str  # "normal", "percentiles", or why there is none
-    count: int
-    outside: int  # values beyond a limit
 
 
 def is_normal(values: Floats) -> bool:
@@ -85,6 +83,11 @@ def is_normal(values: Floats) -> bool:
     return float(shapiro(values[::step]).pvalue) >= _NOT_NORMAL
 
 
+def beyond(values: Floats, lower: float | None, upper: float | None) -> np.ndarray:
+    """(N,) mask of the values outside the limits."""
+    return (values < (-np.inf if lower is None else lower)) | (values > (np.inf if upper is None else upper))
+
+
 def capability(values: Floats, lower: float | None, upper: float | None) -> Capability | None:
     """Ppk from the overall mean and deviation, or from percentiles where the values are not normal.
 
@@ -94,20 +97,17 @@ def capability(values: Floats, lower: float | None, upper: float | None) -> Capa
     """
     if values.size < 2 or np.ptp(values) == 0:
         return None
-    below = values < (-np.inf if lower is None else lower)
-    above = values > (np.inf if upper is None else upper)
-    outside, count = int(np.sum(below | above)), values.size
+    count = values.size
     if is_normal(values):
         middle, deviation = np.mean(values), np.std(values, ddof=1)
         ppk = float(_nearest(middle + deviation * np.array([-3.0, 0.0, 3.0]), lower, upper))
         half = 1.959963985 * float(np.sqrt(1 / (9 * count) + ppk**2 / (2 * (count - 1))))
-        return Capability(ppk, ppk - half, ppk + half, "normal", count, outside)
+        return Capability(ppk, ppk - half, ppk + half, "normal")
     if count < FEWEST_PERCENTILES:
-        why = f"not normal; percentiles need {FEWEST_PERCENTILES} values"
-        return Capability(np.nan, np.nan, np.nan, why, count, outside)
+        return Capability(np.nan, np.nan, np.nan, f"not normal; percentiles need {FEWEST_PERCENTILES} values")
     ppk = float(_nearest(np.asarray(np.quantile(values, _PERCENTILES), dtype=float), lower, upper))
     low, high = np.quantile(_nearest(_resampled(values), lower, upper), [0.025, 0.975]).tolist()
-    return Capability(ppk, low, high, "percentiles", count, outside)
+    return Capability(ppk, low, high, "percentiles")
 
 
 def _resampled(values: Floats) -> Floats:

@@ -12,7 +12,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.data.atomic import write_file
 from mrdamper.errors import ColumnError
-from mrdamper.fleet.charts import Gauge, capability, ewma, gauge_study, individuals
+from mrdamper.fleet.charts import Gauge, beyond, capability, ewma, gauge_study, individuals
 from mrdamper.fleet.job import OTHER_RIG
 from mrdamper.fleet.plan import Plan
 from mrdamper.fleet.profile import ColumnLimits
@@ -106,10 +106,7 @@ def _gauge(golden: pl.DataFrame, line: pl.DataFrame, name: str) -> Gauge | None:
 
 def _judged(line: pl.DataFrame, name: str, limit: ColumnLimits) -> dict[str, Any]:
     values = _values(line, name)
-    outside = (values < (-np.inf if limit.lower is None else limit.lower)) | (
-        values > (np.inf if limit.upper is None else limit.upper)
-    )
-    serials = [s for s, out in zip(line.drop_nulls(name)["serial"].to_list(), outside, strict=True) if out]
+    serials = line.drop_nulls(name)["serial"].to_numpy()[beyond(values, limit.lower, limit.upper)].tolist()
     return {
         "name": name, "limit": limit, "capability": capability(values, limit.lower, limit.upper),
         "outside": len(serials), "count": values.size, "serials": serials[:_MAX_LISTED],
