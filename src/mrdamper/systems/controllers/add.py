@@ -12,18 +12,11 @@ from mrdamper.systems.controllers.base import Controller, Sensors
 
 @dataclass(frozen=True)
 class AccelerationDriven(Controller):
-    """I high where a_above · stroke rate > 0, low elsewhere.
-
-    References
-    ----------
-    Savaresi, Silani and Bittanti (2005), "Acceleration-driven-damper (ADD): an optimal control algorithm
-    for comfort-oriented semiactive suspensions", ASME J. Dynamic Systems, Measurement and Control 127,
-    218–229.
-    """
+    """I high where a_above · stroke rate > 0, low elsewhere."""
 
     name: ClassVar[str] = "add"
     title: ClassVar[str] = "acceleration-driven damper (ADD)"
-    source: ClassVar[str] = "Savaresi, Silani and Bittanti 2005"
+    source: ClassVar[str] = "Savaresi, Silani and Bittanti 2005, J. Dyn. Systems, Measurement and Control 127, 218–229"
 
     def law(self, see: Sensors) -> Any:
         return see.on_off(see("above", "acceleration") * see.stroke_rate > 0)
@@ -31,17 +24,11 @@ class AccelerationDriven(Controller):
 
 @dataclass(frozen=True)
 class MixedSkyhookADD(Controller):
-    """Skyhook where a² < α² v² of the point above the damper, ADD elsewhere; α = 2π f.
-
-    References
-    ----------
-    Savaresi and Spelta (2007), "Mixed sky-hook and ADD: approaching the filtering limits of a semi-active
-    suspension", ASME J. Dynamic Systems, Measurement and Control 129, 382–392.
-    """
+    """Skyhook where a² < α² v² of the point above the damper, ADD elsewhere; α = 2π f."""
 
     name: ClassVar[str] = "sh-add"
     title: ClassVar[str] = "mixed skyhook and ADD"
-    source: ClassVar[str] = "Savaresi and Spelta 2007"
+    source: ClassVar[str] = "Savaresi and Spelta 2007, J. Dyn. Systems, Measurement and Control 129, 382–392"
 
     crossover_Hz: float = param("Hz", "frequency at which the two rules change over", bounds=(0, math.inf), default=1.8)
 

@@ -37,17 +37,11 @@ class Design:
 
 @dataclass(frozen=True)
 class ClippedOptimal(Controller):
-    """I high where (f* − f) f > 0, low elsewhere, f* the force of an LQG controller.
-
-    References
-    ----------
-    Dyke, Spencer, Sain and Carlson (1996), "Modeling and control of magnetorheological dampers for
-    seismic response reduction", Smart Materials and Structures 5, 565–575.
-    """
+    """I high where (f* − f) f > 0, low elsewhere, f* the force of an LQG controller."""
 
     name: ClassVar[str] = "clipped-optimal"
     title: ClassVar[str] = "clipped-optimal (LQG)"
-    source: ClassVar[str] = "Dyke, Spencer, Sain and Carlson 1996"
+    source: ClassVar[str] = "Dyke, Spencer, Sain and Carlson 1996, Smart Materials and Structures 5, 565–575"
 
     effort: float = param(
         "-", "weight of the forces, in accelerations of the whole mass", bounds=(1e-12, math.inf), default=1e-3

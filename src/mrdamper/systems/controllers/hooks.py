@@ -12,17 +12,11 @@ from mrdamper.systems.controllers.base import Controller, Sensors
 
 @dataclass(frozen=True)
 class Skyhook(Controller):
-    """I high where v_above · stroke rate > 0, low elsewhere.
-
-    References
-    ----------
-    Karnopp, Crosby and Harwood (1974), "Vibration control using semi-active force generators",
-    ASME J. Engineering for Industry 96, 619–626.
-    """
+    """I high where v_above · stroke rate > 0, low elsewhere."""
 
     name: ClassVar[str] = "skyhook"
     title: ClassVar[str] = "skyhook, on and off"
-    source: ClassVar[str] = "Karnopp, Crosby and Harwood 1974"
+    source: ClassVar[str] = "Karnopp, Crosby and Harwood 1974, J. Engineering for Industry 96, 619–626"
     calms: ClassVar[str] = "above"
 
     def law(self, see: Sensors) -> Any:
@@ -31,11 +25,11 @@ class Skyhook(Controller):
 
 @dataclass(frozen=True)
 class SkyhookContinuous(Controller):
-    """F = c_sky v_above, as far as the damper can; published with `Skyhook`."""
+    """F = c_sky v_above, as far as the damper can."""
 
     name: ClassVar[str] = "skyhook-continuous"
     title: ClassVar[str] = "skyhook, continuous"
-    source: ClassVar[str] = "Karnopp, Crosby and Harwood 1974"
+    source: ClassVar[str] = Skyhook.source
     calms: ClassVar[str] = "above"
 
     c_sky: float = param("N s/m", "damping to the sky", bounds=(0, math.inf), default=2000.0)
@@ -46,17 +40,11 @@ class SkyhookContinuous(Controller):
 
 @dataclass(frozen=True)
 class Groundhook(Controller):
-    """I high where v_below · stroke rate < 0, low elsewhere.
-
-    References
-    ----------
-    Valášek, Novák, Šika and Vaculín (1997), "Extended ground-hook: new concept of semi-active control
-    of truck's suspension", Vehicle System Dynamics 27, 289–303.
-    """
+    """I high where v_below · stroke rate < 0, low elsewhere."""
 
     name: ClassVar[str] = "groundhook"
     title: ClassVar[str] = "groundhook, on and off"
-    source: ClassVar[str] = "Valášek, Novák, Šika and Vaculín 1997"
+    source: ClassVar[str] = "Valášek, Novák, Šika and Vaculín 1997, Vehicle System Dynamics 27, 289–303"
     calms: ClassVar[str] = "below"
 
     def law(self, see: Sensors) -> Any:
@@ -65,17 +53,11 @@ class Groundhook(Controller):
 
 @dataclass(frozen=True)
 class Hybrid(Controller):
-    """F = share c v_above − (1 − share) c v_below, as far as the damper can.
-
-    References
-    ----------
-    Ahmadian (1997), "A hybrid semiactive control for secondary suspension applications", ASME
-    Symposium on Advanced Automotive Technologies.
-    """
+    """F = share c v_above − (1 − share) c v_below, as far as the damper can."""
 
     name: ClassVar[str] = "hybrid"
     title: ClassVar[str] = "hybrid of skyhook and groundhook"
-    source: ClassVar[str] = "Ahmadian 1997"
+    source: ClassVar[str] = "Ahmadian 1997, A hybrid semiactive control, ASME Symp. Advanced Automotive Technologies"
 
     c_hook: float = param("N s/m", "damping to the sky and to the road", bounds=(0, math.inf), default=2000.0)
     share: float = param("-", "of the skyhook; the rest is groundhook", bounds=(0, 1), default=0.5)

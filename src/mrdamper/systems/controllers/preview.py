@@ -23,16 +23,11 @@ class NonCausalOptimum(Controller):
 
     A linear-quadratic problem with a known disturbance, solved backwards in the time steps of the simulation: the bound
     holds to rounding, without bump-stop contact and wheel lift-off.
-
-    References
-    ----------
-    Bryson and Ho (1975), "Applied Optimal Control", chapter 5; for suspensions Hrovat (1997),
-    "Survey of advanced suspension developments", Automatica 33, 1781–1817.
     """
 
     name: ClassVar[str] = "preview"
     title: ClassVar[str] = "optimum with the whole record known"
-    source: ClassVar[str] = "Bryson and Ho 1975; Hrovat 1997"
+    source: ClassVar[str] = "Bryson and Ho 1975, Applied Optimal Control, ch. 5; Hrovat 1997, Automatica 33, 1781–1817"
 
     def law(self, see: Sensors) -> Any:
         return see.low
