@@ -97,7 +97,7 @@ def write_result(folder: str | Path, record: ResultRecord | None = None) -> Gene
 
 
 def publish(folder: str | Path, files: Mapping[str, str | bytes], record: ResultRecord | None = None) -> list[Path]:
-    """Write a result, given by the contents of its files, as `write_result` does; return the paths, the first first."""
+    """Write a result, given by the contents of its files, as `write_result` does; return the paths, the page first."""
     with write_result(folder, record) as work:
         for name, content in files.items():
             (work / name).parent.mkdir(exist_ok=True)

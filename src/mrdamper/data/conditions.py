@@ -134,7 +134,7 @@ def _levels(currents: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def level_groups(currents: Sequence[float | None]) -> dict[float, list[int]]:
-    """Group the indices of currents by their level [A], rising, in either direction; None, a change, is of no level."""
+    """Group the indices of currents by level [A], rising, in either direction; None, a changing current, is of none."""
     constant = {i: abs(current) for i, current in enumerate(currents) if current is not None}
     groups: dict[float, list[int]] = {}
     for i, level in zip(constant, current_levels([*constant.values()]), strict=True):

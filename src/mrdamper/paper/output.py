@@ -42,7 +42,7 @@ def write_reproduction(
     png: bool = False,
     processes: Processes = IN_PROCESS,
 ) -> list[Path]:
-    """Write reproduction.html, tables/ and figures/ atomically, drawn in `processes`; return the page and the rest."""
+    """Write reproduction.html, tables/ and figures/ atomically, drawn in `processes`; return the paths, page first."""
     claims, names, parts = check_claims(study), tuple(FIGURES), 2 * processes.count
     drawn: dict[str, Picture | str] = {}
     draw = partial(pictures, study, ("png",) if png else ())

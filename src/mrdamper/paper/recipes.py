@@ -50,7 +50,7 @@ def recipes_of_paper(
     *,
     explain: bool = True,
 ) -> Steps:
-    """Return the fast recipes and their runs; with `explain` the literal one states the hysteretic part of c."""
+    """Return the fast recipes and the runs of each; with `explain` the literal one states the hysteretic part of c."""
     literal = replace(options.method("optimum"), explain=explain)
     half = replace(literal, force_amplitude="half-peak-to-peak", explain=False)
     consistent = assumptions.basis(Balance())
@@ -71,7 +71,7 @@ def recipes_of_paper(
 
 
 def comparators(train: Sequence[Run], held_out: Sequence[Run], assumptions: PaperAssumptions) -> Steps:
-    """Return the paper's comparators: genetic search, a run per current; Ali's slow model, at every other of many."""
+    """Return the paper's comparators: genetic search on a run per current; Ali's slow model on every other current."""
     basis = assumptions.basis(DirectGenetic.name)
     direct = Recipe("bouc-wen:direct-genetic", basis, one_per_current, "traditional", DIRECT)
     ali = replace(conditioned(all_published()["ali-type"]), way="literature", title=ALI)

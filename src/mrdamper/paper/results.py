@@ -158,7 +158,7 @@ def rate_rows(study: Reproduction) -> list[dict[str, Any]]:
 
 
 def cost_per_run(study: Reproduction, method: RecipeResult) -> tuple[float, float]:
-    """Return forces (median) and seconds per identification and its share of the fit; the paper's by genetic search."""
+    """Return forces (median) and seconds per identification, the fit included; the paper's by its genetic search."""
     if method.recipe.title == LITERAL and study.ended:
         return float(np.median([e.forces for e in study.ended])), float(np.mean([e.seconds for e in study.ended]))
     counts = [i.evaluations for i in method.identifications]

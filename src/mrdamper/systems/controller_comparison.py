@@ -37,7 +37,7 @@ def compare_controllers(
     highest: float | None = None,
     progress: Progress = silent,
 ) -> ControllerComparison:
-    """Run no current, the highest current, some controllers and the non-causal optimum at the step of a simulation."""
+    """Run no current, the highest, other controllers and the non-causal optimum at the step of a simulation."""
     if highest is None:
         highest = max(damper.envelope.current_A[1] for damper in dampers.values())
     between = {"no current": Passive(), f"{highest:.3g} A": Passive(highest), **{_title(c): c for c in controllers}}

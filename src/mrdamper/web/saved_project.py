@@ -99,7 +99,7 @@ def save_project(session: Session, state: str, shown: str | None, logo: str = ""
 
 
 def open_saved_project(path: Path, place: Path) -> SavedProject:
-    """Read a saved project, its data unpacked in `place`; raises `SavedProjectError`, or another `InputError`."""
+    """Read a saved project, whose data are unpacked in `place`; raises `SavedProjectError`, or another `InputError`."""
     try:
         with zipfile.ZipFile(path) as archive:
             return _read(archive, place / "project")
