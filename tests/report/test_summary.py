@@ -7,6 +7,7 @@ import pytest
 
 from mrdamper.report import page
 from mrdamper.report.page import percent, plain, render_page
+from mrdamper.report.study import _chapter
 from mrdamper.report.summary import omission_lines, study_lines
 
 
@@ -102,3 +103,13 @@ def test_a_table_of_headings_alone_is_kept(monkeypatch):
     table = "<table><tr><th>a</th><th>b</th></tr></table>"
     monkeypatch.setattr(page._ENVIRONMENT, "loader", jinja2.DictLoader({"page": table}))
     assert render_page("page", "", "") == table
+
+
+def test_the_caption_of_predicted_loops_tells_absent_validation_runs_from_those_that_are_no_sines(bundled_study):
+    rig = bundled_study.rigs[0]
+    trained = replace(rig, dataset=rig.dataset.only([replace(run, split="train") for run in rig.dataset]))
+    assert _chapter(trained, {}, ())["predicted_caption"].startswith("Identification runs")
+    assert "no validation run is a steady sine." in _chapter(trained, {}, ())["predicted_caption"]
+    chosen = replace(rig.chosen, validation=replace(rig.chosen.validation, runs=()))
+    alone = replace(trained, candidates=(chosen, *rig.candidates[1:]))
+    assert "there are no validation runs." in _chapter(alone, {}, ())["predicted_caption"]

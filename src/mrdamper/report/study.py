@@ -200,7 +200,8 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, Picture], limits: Sequence[Li
         "predicted_caption": (
             "Validation runs, last cycle of the steady window; none was used for identification."
             if held
-            else "Identification runs, last cycle of the steady window; no validation run is a steady sine."
+            else "Identification runs, last cycle of the steady window; "
+            + ("no validation run is a steady sine." if chosen.validation.runs else "there are no validation runs.")
         )
         + (
             f" Dotted: {100 * BAND_LEVEL:.0f} % prediction interval {scope(chosen.damper, BAND_LEVEL)}."
