@@ -13,6 +13,7 @@ from mrdamper.dampers.normal_equations import (
     _ShapeSearch,
     _solve,
     choose_forms,
+    fit_each_jointly,
     fit_jointly,
     leave_out_errors,
 )
@@ -89,12 +90,31 @@ def test_what_is_found_does_not_show_rounding(runs):
 def test_the_slopes_of_the_search_are_those_of_its_errors(runs):
     data = condense(runs, BoucWen)
     start = ParameterFunction("linear-current", (0.1, np.log(8e-4)), log=True)
-    search = _ShapeSearch(_Design(data, FORMS), start, np.linspace(1, 2, len(runs)))
-    at = np.array(start.coefficients) * search.scale
-    expected = [
-        (np.sum(search.residual(at + s) ** 2) - np.sum(search.residual(at - s) ** 2)) / 4e-5 for s in 1e-5 * np.eye(2)
-    ]
-    np.testing.assert_allclose(search.gradient(at), expected, rtol=1e-6)
+    search = _ShapeSearch(_Design(data, [FORMS]), [start], np.ones((1, len(runs)), dtype=bool))
+    search.weights[0], row, some = np.linspace(1, 2, len(runs)), np.zeros(1, dtype=int), np.ones(1, dtype=bool)
+    costs = [[search.at(row, search.start + sign * step).cost[0] for sign in (1, -1)] for step in 1e-5 * np.eye(2)]
+    expected = [(after - before) / 4e-5 for after, before in costs]
+    np.testing.assert_allclose(search.at(row, search.start).products(some)[0][0], expected, rtol=1e-6)
+
+
+def test_fits_made_at_once_are_those_made_one_by_one(runs):
+    """Of several forms and starts, and of several sets of runs, among them one without a current."""
+    data = condense(runs, BoucWen)
+    constant, line = (ParameterFunction(name, (*slope, np.log(5e-4)), log=True)
+                      for name, slope in (("constant", ()), ("linear-current", (0.1,))))  # fmt: skip
+    forms = [{**FORMS, "c": Law(name)} for name in ("constant", "quadratic-current", "absent")]
+    every = np.ones((3, len(runs)), dtype=bool)
+    at_once = fit_each_jointly(data, forms, [constant, line, constant], every)
+    alone = [fit_jointly(data, *each) for each in zip(forms, [constant, line, constant], strict=True)]
+    kept = [range(1, len(runs)), range(3), range(0, len(runs), 2)]
+    without = np.array([np.isin(np.arange(len(runs)), rows) for rows in kept])
+    at_once += fit_each_jointly(data, [FORMS], [line], without)
+    alone += [fit_jointly(condense([runs[i] for i in rows], BoucWen), FORMS, line) for rows in kept]
+    for one, other in zip(at_once, alone, strict=True):
+        assert list(one.parameters.functions) == list(other.parameters.functions)
+        for name, function in one.parameters.functions.items():
+            expected = other.parameters.functions[name].coefficients
+            np.testing.assert_allclose(function.coefficients, expected, rtol=1e-8, atol=1e-8, err_msg=name)
 
 
 def test_condensed_error_is_the_error_in_time(runs, identifications):
@@ -116,8 +136,8 @@ def test_leave_out_is_larger_than_fit_and_needs_every_group(runs):
         kept = 1 / np.sqrt(fit.nrmse_pp)
         kept[group] = 0.0
         shapes = fit.parameters.functions[data.shape](*features(data.conditions))
-        table, _ = _Design(data, FORMS).table(data.at(shapes)[0])
-        assert errors[place] == pytest.approx(_solve(table, kept).nrmse_pp[group[0]], rel=1e-9)
+        table, _ = _Design(data, [FORMS]).table(data.at(shapes)[0])
+        assert errors[place] == pytest.approx(_solve(table, kept[None]).nrmse_pp[0, group[0]], rel=1e-9)
 
 
 def test_forms_are_chosen_short(runs, identifications):
