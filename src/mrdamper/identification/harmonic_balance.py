@@ -15,11 +15,13 @@ from typing import Literal
 import numpy as np
 
 from mrdamper.data import Condition, Floats, Run
+from mrdamper.data.runs import once_per_run
 from mrdamper.data.wording import counted
 from mrdamper.errors import ExcitationError, IdentificationError
 from mrdamper.physics.hysteresis import Shape, loop_harmonics
 from mrdamper.physics.motion import SINE_DISTORTION_LIMIT, STRAY_LIMIT, Excitation, analyse_motion
 from mrdamper.physics.motion.harmonics import fit_harmonics
+from mrdamper.physics.motion.path import memoize_per_path
 from mrdamper.statistics.linear import solve_linear
 
 AmplitudeReading = Literal["first-harmonic", "half-peak-to-peak", "maximum"]
@@ -43,21 +45,7 @@ class SineRecord:
 
         Raises `ExcitationError` if it holds under one cycle, or its motion is no sine.
         """
-        analysis = analyse_motion(run)
-        if not analysis.is_sine:
-            raise ExcitationError(
-                f"the motion is no sine: distortion {100 * analysis.distortion:.1f} %, "
-                f"motion at other frequencies {100 * analysis.stray:.0f} %; "
-                f"harmonic balance takes up to {100 * SINE_DISTORTION_LIMIT:g} and {100 * STRAY_LIMIT:g} %",
-                where=f"run {run.id}",
-                remedy="identify with method projection, which follows any motion",
-            )
-        steady, series = run.steady(), analysis.series
-        omega = 2 * np.pi * series.frequency
-        theta = omega * (steady.time - series.origin) + series.phase(1) % (2 * np.pi)
-        measured = analysis.condition
-        condition = Condition(measured.current_A, series.frequency, series.amplitude(1))
-        return cls(run.id, condition, theta, steady.force)
+        return _sine_record(run)
 
     @property
     def omega(self) -> float:
@@ -71,6 +59,25 @@ class SineRecord:
         x = X * np.sin(self.theta)
         v = X * omega * np.cos(self.theta)
         return Excitation(self.theta / omega, x, v, -(omega**2) * x, np.full(x.size, self.condition.current_A))
+
+
+@once_per_run
+def _sine_record(run: Run) -> SineRecord:
+    analysis = analyse_motion(run)
+    if not analysis.is_sine:
+        raise ExcitationError(
+            f"the motion is no sine: distortion {100 * analysis.distortion:.1f} %, "
+            f"motion at other frequencies {100 * analysis.stray:.0f} %; "
+            f"harmonic balance takes up to {100 * SINE_DISTORTION_LIMIT:g} and {100 * STRAY_LIMIT:g} %",
+            where=f"run {run.id}",
+            remedy="identify with method projection, which follows any motion",
+        )
+    steady, series = run.steady(), analysis.series
+    omega = 2 * np.pi * series.frequency
+    theta = omega * (steady.time - series.origin) + series.phase(1) % (2 * np.pi)
+    measured = analysis.condition
+    condition = Condition(measured.current_A, series.frequency, series.amplitude(1))
+    return SineRecord(run.id, condition, theta, steady.force)
 
 
 @dataclass(frozen=True)
@@ -171,13 +178,19 @@ class HarmonicProjection:
     def __init__(self, theta: Floats, harmonics: int):
         resolved = int(np.pi / float(np.median(np.diff(theta))))
         self.harmonics = max(1, min(harmonics, resolved))
-        angle = np.outer(theta, np.arange(1, self.harmonics + 1))
-        basis = np.column_stack([theta - theta.mean(), np.ones_like(theta), np.sin(angle), np.cos(angle)])
-        self._rows = np.linalg.qr(basis)[0].T[1:]
+        self._rows = _harmonic_basis(theta, self.harmonics)
 
     def __call__(self, signals: Floats) -> Floats:
         """Project signals, (N,) or (N, S) -> (1 + 2H,) or (1 + 2H, S)."""
         return self._rows @ signals
+
+
+@memoize_per_path
+def _harmonic_basis(theta: Floats, harmonics: int) -> Floats:
+    """(1 + 2H, N) orthonormal rows of the mean and the harmonics, without a linear drift."""
+    angle = np.outer(theta, np.arange(1, harmonics + 1))
+    basis = np.column_stack([theta - theta.mean(), np.ones_like(theta), np.sin(angle), np.cos(angle)])
+    return np.asarray(np.linalg.qr(basis)[0].T[1:], dtype=float)
 
 
 def _extremes(record: SineRecord) -> list[tuple[float, float]]:

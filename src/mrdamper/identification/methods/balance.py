@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mrdamper.data import Floats
 from mrdamper.errors import IdentificationError
@@ -59,11 +60,12 @@ class Balance(Method):
         kind = problem.model_type
         axes = kind.within(kind.search_axes(Scale.of(record.motion, record.force, X), problem.free), problem.fixed)
         if not axes:
-            model, _, held = balanced.at({})
+            model, held = balanced.model({})
             return Solution(model, 0.0, held, {}, {}, 1, StopReason.SOLVED)
 
         def residual(u: Floats) -> Floats:
-            return balanced.at(values_at(axes, u))[1]
+            _, columns, right, solution, _ = balanced.at(values_at(axes, u))
+            return columns @ solution - right
 
         grid = grid_of(axes)
         costs = [float(np.sum(residual(u) ** 2)) for u in grid]
@@ -71,7 +73,7 @@ class Balance(Method):
         minima = [(start, least_squares(residual, start, *box_of(axes))) for start in starts]
         start, best = min(minima, key=lambda pair: pair[1].cost)
         end = values_at(axes, best.point)
-        model, _, held = balanced.at(end)
+        model, held = balanced.model(end)
         return Solution(
             model=model,
             delay=0.0,
@@ -91,29 +93,33 @@ class _Balanced:
         self.motion = record.motion
         self.linear = [i for i in problem.model_type.parameters() if i.linear and i.name in problem.free]
         self.bounds = bounds_of(self.linear)
+        self.zero = {i.name: 0.0 for i in self.linear}
         self.measured = project(record.force)
-        self._once: tuple[Floats, Floats] | None = None
+        self._once: tuple[Floats, Floats, Floats] | None = None  # force without linear parameters, and the table
 
-    def at(self, point: Mapping[str, float]) -> tuple[Model, Floats, tuple[str, ...]]:
-        """Model, residual harmonics (orthonormal) and parameters held at a bound."""
-        zero = {i.name: 0.0 for i in self.linear}
-        bare = self.problem.model_type.build({**self.problem.fixed, **point, **zero})
-        base, forces = self._table(bare, steady_state(bare, self.record))
-        columns, right = self.project(forces), self.measured - self.project(base)
-        solution, held = solve_bounded(columns, right, *self.bounds)
-        names = [i.name for i in self.linear]
-        model = replace(bare, **dict(zip(names, solution.tolist(), strict=True)))
-        return model, columns @ solution - right, tuple(n for n, h in zip(names, held, strict=True) if h)
+    def model(self, point: Mapping[str, float]) -> tuple[Model, tuple[str, ...]]:
+        """Model with the linear parameters solved for, and those held at a bound."""
+        bare, _, _, solution, held = self.at(point)
+        model = replace(bare, **dict(zip(self.zero, solution.tolist(), strict=True)))
+        return model, tuple(n for n, h in zip(self.zero, held, strict=True) if h)
+
+    def at(self, point: Mapping[str, float]) -> tuple[Model, Floats, Floats, Floats, NDArray[np.bool_]]:
+        """Model without linear parameters, their columns and the right side (harmonics), the solution, its bounds."""
+        bare = self.problem.model_type.build({**self.problem.fixed, **point, **self.zero})
+        columns, right = self._table(bare, steady_state(bare, self.record))
+        return bare, columns, right, *solve_bounded(columns, right, *self.bounds)
 
     def _table(self, bare: Model, state: Floats) -> tuple[Floats, Floats]:
-        """`linear_table`, computed once if a shape changes one column only."""
+        """Harmonics of the linear columns and of the rest; only the column of the state is computed again, if any."""
         infos = [i for i in self.linear if i.name == bare.state_column]
         if self._once is None or not infos:
-            self._once = linear_table(bare, self.linear, self.motion, state)
-            return self._once
-        base, forces = self._once
-        forces[:, self.linear.index(infos[0])] = linear_table(bare, infos, self.motion, state, base)[1][:, 0]
-        return base, forces
+            base, forces = linear_table(bare, self.linear, self.motion, state)
+            self._once = base, self.project(forces), self.measured - self.project(base)
+        else:
+            column = linear_table(bare, infos, self.motion, state, self._once[0])[1][:, 0]
+            twice = np.stack([column, column]).T  # a product of matrices, which has the bits of that of all columns
+            self._once[1][:, self.linear.index(infos[0])] = self.project(twice)[:, 0]
+        return self._once[1:]
 
 
 def steady_state(model: Model, record: SineRecord) -> Floats:
