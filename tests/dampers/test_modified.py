@@ -181,7 +181,7 @@ def test_a_joint_fit_is_made_of_forms_without_rates_but_for_the_shape(monkeypatc
         asked.setdefault("kept", []).extend(np.flatnonzero(each).tolist() for each in kept)
         return [SimpleNamespace(parameters=parameters) for _ in kept]
 
-    monkeypatch.setattr(modified, "fit_each_jointly", fitted)
+    monkeypatch.setattr(modified, "fit_jointly", fitted)
     rows = SimpleNamespace(of=lambda c: SimpleNamespace(condition=c, sine=c))
     monkeypatch.setattr(modified, "RunRows", rows)
     everything, fold = range(len(CONDITIONS)), [1, 2]

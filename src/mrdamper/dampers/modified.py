@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from mrdamper.dampers.base import Damper, Saved, not_held
 from mrdamper.dampers.condensed_runs import Condensed, condense
 from mrdamper.dampers.envelope import Envelope
-from mrdamper.dampers.normal_equations import ABSENT, Law, choose_forms, fit_each_jointly
+from mrdamper.dampers.normal_equations import ABSENT, Law, choose_forms, fit_jointly
 from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.dampers.run_rows import RunRows, envelope_of
 from mrdamper.dampers.uncertainty import FittedParameter
@@ -261,7 +261,7 @@ def fit_modified_jointly(
         return refits([one for one in omitted if not one.all()])
 
     def refits(omitted: Sequence[NDArray[np.bool_]]) -> dict[tuple[int, ...], ParameterMap]:
-        fits = fit_each_jointly(data, [forms], [start], ~np.array(omitted)) if omitted else []
+        fits = fit_jointly(data, [forms], [start], ~np.array(omitted)) if omitted else []
         return {tuple(np.flatnonzero(~one).tolist()): fit.parameters for one, fit in zip(omitted, fits, strict=True)}
 
     def refit(rows: Sequence[int]) -> ModifiedModel:

@@ -27,12 +27,7 @@ from mrdamper.statistics.functions.fitting import fit_function, require_determin
 from mrdamper.statistics.functions.forms import FORMS, Form, ParameterFunction, features
 from mrdamper.statistics.functions.selection import broken_law, rises, smaller_wins, supported
 from mrdamper.statistics.linear import inverse_of_triangle, on_one_blas_thread, robust_weights, solve_weighted
-from mrdamper.statistics.stacked_least_squares import (
-    least_squares_of_each,
-    newton_refine_each,
-    products_of_rest_of_each,
-    solve_each,
-)
+from mrdamper.statistics.stacked_least_squares import Products, least_squares_of_each, newton_refine_each, solve_each
 
 _SEARCH_TOLERANCE = 1e-6  # relative gain of a step at which a search ends
 _WEIGHT_TOLERANCE = 1e-3  # change of the robust weights below which the rounds end
@@ -83,38 +78,23 @@ class JointFunctionFit:
     at_bounds: tuple[str, ...] = ()  # the shape coordinate, where its function leaves the search range
 
 
-def fit_jointly(
-    data: Condensed,
-    forms: Mapping[str, Law],
-    start: ParameterFunction | None,
-    *,
-    reweightings: int = 6,
-    most_steps: int = 12,
-    polish: bool = True,
-) -> JointFunctionFit:
-    """Fit the coefficients of all parameter functions to all runs at once, with some form of each coordinate.
-
-    `start` is the function of the shape coordinate to start from; its form and rates are used. It is None for models
-    without one. `reweightings` and `most_steps` are the rounds of robust weights and the steps of the search in each.
-    `polish`: refine to the last digits at the end, so that results do not depend on rounding.
-    """
-    kept = np.ones((1, data.scale.size), dtype=bool)
-    return fit_each_jointly(data, [forms], [start], kept, reweightings, most_steps, polish)[0]
-
-
 @on_one_blas_thread
-def fit_each_jointly(
+def fit_jointly(
     data: Condensed,
     forms: Sequence[Mapping[str, Law]],
     starts: Sequence[ParameterFunction | None],
     kept: NDArray[np.bool_],
+    *,
     reweightings: int = 6,
     most_steps: int = 12,
     polish: bool = True,
 ) -> list[JointFunctionFit]:
-    """Make B fits as `fit_jointly` at once: of several forms and starts, or of several sets of the runs.
+    """Fit the coefficients of all parameter functions to all runs, with some form of each coordinate: B fits at once.
 
-    Forms and starts are B, or one for all; `kept` (B, R) marks the runs of each fit.
+    They are of several forms and starts, or of several sets of the runs: `forms` and `starts` are B, or one for all;
+    `kept` (B, R) marks the runs of each fit. A start is a function of the shape coordinate, whose form and rates are
+    used; None for models without one. `reweightings` and `most_steps` are the rounds of robust weights and the steps of
+    the search in each. `polish`: refine to the last digits at the end, so that results do not depend on rounding.
     """
     design = _Design(data, forms)
     if not data.shape:
@@ -125,7 +105,7 @@ def fit_each_jointly(
     box, rows = (centre - _SEARCH_RANGE, centre + _SEARCH_RANGE), np.arange(len(kept))
     for left in range(reweightings - 1, -1, -1):
         centre[rows] = least_squares_of_each(
-            search.at, rows, centre[rows], box[0][rows], box[1][rows], most_steps, _SEARCH_TOLERANCE
+            search, rows, centre[rows], box[0][rows], box[1][rows], most_steps, _SEARCH_TOLERANCE
         )
         weights = kept[rows] * robust_weights(search.at(rows, centre[rows]).solution.nrmse_pp, _MIN_ERROR_PP)
         change = np.abs(weights / np.where(kept[rows], search.weights[rows], 1.0) - kept[rows])
@@ -135,7 +115,7 @@ def fit_each_jointly(
             break
         search.weights[rows] = weights[unsettled]
     if polish:
-        centre = newton_refine_each(search.at, centre, *box)
+        centre = newton_refine_each(search, centre, *box)
     at, ends, fits = search.at(np.arange(len(kept)), centre), data.ladder[[0, -1]], list[JointFunctionFit]()
     reached = np.exp(at.logs)
     outside = (reached <= ends[0] * GRID_RATIO**0.01) | (reached >= ends[1] / GRID_RATIO**0.01)
@@ -236,6 +216,11 @@ class _ShapeSearch:
         self.start = first * self.scale
         self.ends: tuple[float, float] = np.log(data.ladder[[0, -1]]).tolist()
 
+    def __call__(self, rows: NDArray[np.intp], u: Floats) -> tuple[Floats, Products]:
+        """Costs of some of the sets at a point each, and the function of their products."""
+        point = self.at(rows, u)
+        return np.sum((point.weights * point.solution.nrmse_pp) ** 2, axis=1), point.products
+
     def at(self, rows: NDArray[np.intp], u: Floats) -> _ShapePoint:
         """Evaluate some of the sets at a point each."""
         low, high = self.ends
@@ -259,10 +244,6 @@ class _ShapePoint(NamedTuple):
     factor: Floats
     solution: _Solution
 
-    @property
-    def cost(self) -> Floats:
-        return np.sum((self.weights * self.solution.nrmse_pp) ** 2, axis=1)
-
     def products(self, some: NDArray[np.bool_]) -> tuple[Floats, Floats]:
         """Jᵀr and JᵀJ of the residual r and its derivatives J, the others moving along [Kaufman 1975, BIT 15, 49]."""
         columns, weights, error = self.columns[some], self.weights[some], self.solution.error[some]
@@ -273,7 +254,8 @@ class _ShapePoint(NamedTuple):
         slopes = (by_shape * columns[:, :, None, :]).reshape(len(error), -1, columns.shape[2])
         held = (weights[:, :, None, None] * self.table[some][..., :-1]).reshape(*slopes.shape[:2], -1)
         residual = (weights[:, :, None] * error).reshape(len(error), 1, -1)
-        return (residual @ slopes)[:, 0], products_of_rest_of_each(held, slopes)
+        rest = slopes - held @ solve_each(held, slopes)
+        return (residual @ slopes)[:, 0], rest.transpose(0, 2, 1) @ rest
 
 
 @cache
@@ -285,7 +267,7 @@ def _upper_half(size: int) -> Floats:
 def _solve(table: Floats, weights: Floats) -> _Solution:
     """Coefficients of least weighted squares (B, P); errors are those of the condensed runs."""
     weighted = (weights[:, :, None, None] * table).reshape(len(weights), -1, table.shape[-1])
-    return _Solution.of(table, solve_each(weighted[:, :, :-1], weighted[:, :, -1], _RANK_LIMIT))
+    return _Solution.of(table, solve_each(weighted[:, :, :-1], weighted[:, :, -1:])[:, :, 0])
 
 
 def _factor(gram: Floats) -> Floats:
@@ -362,7 +344,9 @@ def choose_forms(
         if forms == before:
             break
     forms, fit = _with_nearer_rates(data, forms, start, units)
-    return FormChoice(forms, fit_jointly(data, forms, fit.parameters.functions.get(data.shape)), refused)
+    every = np.ones((1, data.scale.size), dtype=bool)
+    fits = fit_jointly(data, [forms], [fit.parameters.functions.get(data.shape)], every)
+    return FormChoice(forms, fits[0], refused)
 
 
 def _with_nearer_rates(
@@ -424,7 +408,7 @@ def _try_all(data: Condensed, trials: Sequence[Mapping[str, Law]], shape_values:
         except IdentificationError as error:
             data.trials[key] = error
     kept = np.ones((len(able), data.scale.size), dtype=bool)
-    fits = fit_each_jointly(data, able, starts, kept, reweightings=2, most_steps=5, polish=False) if able else []
+    fits = fit_jointly(data, able, starts, kept, reweightings=2, most_steps=5, polish=False) if able else []
     for forms, fit in zip(able, fits, strict=True):
         data.trials[*forms.items(), shape_values] = fit, leave_out_errors(data, fit, forms)
 

@@ -7,12 +7,11 @@ every operation of NumPy, whose overhead is larger than the arithmetic of one sm
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mrdamper.statistics.linear import Floats, inverse_of_gram, project_out_columns, solve_linear
+from mrdamper.statistics.linear import Floats, inverse_of_gram, solve_linear
 
 _FIRST_DAMPING, _STIFFEST = 1e-3, 1e12
 _WORTHLESS = 1e-3  # share of the tolerated gain below which a step is not tried
@@ -22,25 +21,15 @@ _STEP_TOLERANCE = 1e-13  # of the box: the end
 _ROUNDING_STEP = 1e-10  # of the box: steps that rounding may prevent from decreasing
 _FLAT_CURVATURE = 1e-12  # share of the largest curvature
 _POLISHING = 25  # steps
-_RANK_LIMIT = 1e-10  # pivot over the largest below which a column is rounding
+_RANK_LIMIT = 1e-10  # singular value over the largest below which a coefficient is not determined
 
 Rows = NDArray[np.intp]  # indices of some of the problems
 
 
-class Evaluation(Protocol):
-    """Some of the problems, evaluated at a point each."""
-
-    @property
-    def cost(self) -> Floats:
-        """(B,) sums of squared residuals."""
-        ...
-
-    def products(self, some: NDArray[np.bool_]) -> tuple[Floats, Floats]:
-        """(M, D) Jᵀr and (M, D, D) JᵀJ of the problems that `some` (B,) marks, of residuals r and derivatives J."""
-        ...
-
-
-Evaluate = Callable[[Rows, Floats], Evaluation]  # the problems at some indices (B,), each at its point (B, D)
+# Of the problems at some indices (B,), each at its point (B, D): sums of squared residuals (B,), and a function of
+# marks (B,) that gives Jᵀr (M, D) and JᵀJ (M, D, D) of the marked ones, of residuals r and their derivatives J
+Products = Callable[[NDArray[np.bool_]], tuple[Floats, Floats]]
+Evaluate = Callable[[Rows, Floats], tuple[Floats, Products]]
 
 
 def least_squares_of_each(
@@ -52,12 +41,11 @@ def least_squares_of_each(
     before_point, before_gradient, gradient = np.zeros((3, count, size))
     normal, extra = np.zeros((2, count, size, size))
     damping, steps, at_fresh = np.full(count, _FIRST_DAMPING), np.zeros(count, dtype=int), np.ones(count, dtype=bool)
-    evaluation = evaluate(rows, point)
-    cost, active = evaluation.cost, np.flatnonzero(at_fresh)
-    fresh = active
+    cost, products = evaluate(rows, point)
+    active = fresh = np.flatnonzero(at_fresh)
     while active.size:
         if fresh.size:
-            gradient[fresh], normal[fresh] = evaluation.products(at_fresh)
+            gradient[fresh], normal[fresh] = products(at_fresh)
             moved = fresh[steps[fresh] > 0]
             change = gradient[moved] - before_gradient[moved]
             extra[moved] = _learnt_curvature(extra[moved], point[moved] - before_point[moved], change, normal[moved])
@@ -70,13 +58,13 @@ def least_squares_of_each(
         if not active.size:
             break
         trial = np.minimum(np.maximum(at + step, lower[active]), upper[active])
-        evaluation = evaluate(rows[active], trial)
-        gain = cost[active] - evaluation.cost
+        reached, products = evaluate(rows[active], trial)
+        gain = cost[active] - reached
         accepted = gain > 0
         better = active[accepted]
         damping[active] = np.where(accepted, np.maximum(damping[active] / 10, 1e-12), damping[active] * 10)
         before_point[better], before_gradient[better] = point[better], gradient[better]
-        point[better], cost[better] = trial[accepted], evaluation.cost[accepted]
+        point[better], cost[better] = trial[accepted], reached[accepted]
         steps[better] += 1
         width = upper[active] - lower[active]
         settled = (gain <= tolerance * cost[active]) | (np.max(np.abs(trial - at) / width, axis=1) < tolerance)
@@ -91,7 +79,7 @@ def newton_refine_each(evaluate: Evaluate, start: Floats, lower: Floats, upper: 
     rows, size = np.arange(len(start)), start.shape[1]
 
     def gradient(points: Floats) -> Floats:
-        return evaluate(rows, points).products(np.ones(len(rows), dtype=bool))[0]
+        return evaluate(rows, points)[1](np.ones(len(rows), dtype=bool))[0]
 
     width = upper - lower
     slope = here = gradient(start)
@@ -126,8 +114,8 @@ def newton_refine_each(evaluate: Evaluate, start: Floats, lower: Floats, upper: 
     return np.where((able & (last < _ROUNDING_STEP))[:, None], refined, start)
 
 
-def solve_each(columns: Floats, right: Floats, rank_limit: float | None = None) -> Floats:
-    """(B, L) coefficients of least squares as `solve_linear`: of B problems, (B, N, L) columns, (B, N) right sides.
+def solve_each(columns: Floats, right: Floats) -> Floats:
+    """(B, L, D) coefficients of B problems of least squares, from (B, N, L) columns and (B, N, D) right sides.
 
     A column that is zero in some of the problems has a coefficient of zero there.
     """
@@ -136,25 +124,10 @@ def solve_each(columns: Floats, right: Floats, rank_limit: float | None = None) 
     diagonal = np.einsum("bii->bi", gram)
     diagonal[diagonal == 0] = 1.0
     if (inverse := inverse_of_gram(gram)) is None:
-        return np.array([solve_linear(c, r, rank_limit) for c, r in zip(columns, right, strict=True)])
-    solution = inverse @ (turned @ right[:, :, None])
-    return (solution + inverse @ (turned @ (right[:, :, None] - columns @ solution)))[:, :, 0]
-
-
-def products_of_rest_of_each(columns: Floats, right: Floats) -> Floats:
-    """(B, D, D) products of right sides (B, N, D), as `products_of_rest`, less what columns (B, N, L) explain."""
-    scale, count = np.linalg.norm(columns, axis=1, keepdims=True), columns.shape[2]
-    whole = np.concatenate([columns / np.where(scale > 0, scale, 1.0), right], axis=2)
-    if not scale.all():  # a further row for each column that is zero
-        whole = np.concatenate([whole, np.zeros((len(whole), count, whole.shape[2]))], axis=1)
-        np.einsum("bii->bi", whole[:, -count:, :count])[:] = scale[:, 0] == 0
-    triangle = np.asarray(np.linalg.qr(whole, mode="r"), dtype=float)
-    pivots, rest = np.abs(triangle.diagonal(0, 1, 2)[:, :count]), triangle[:, count:, count:]
-    products = rest.transpose(0, 2, 1) @ rest
-    for k in np.flatnonzero(pivots.min(axis=1, initial=1.0) <= _RANK_LIMIT * pivots.max(axis=1, initial=1.0)):
-        rest = project_out_columns(columns[k], right[k])
-        products[k] = rest.T @ rest
-    return products
+        each = [[solve_linear(c, side, _RANK_LIMIT) for side in r.T] for c, r in zip(columns, right, strict=True)]
+        return np.array(each).transpose(0, 2, 1)
+    solution = inverse @ (turned @ right)
+    return solution + inverse @ (turned @ (right - columns @ solution))
 
 
 def _damped_steps(
