@@ -44,6 +44,7 @@ _OTHER_FORCE = re.compile("(?i)" + "|".join(words("other_force")))  # than the d
 _FIGURE = re.compile("(?i)" + "|".join(words("figure")))  # in a line that is not about the columns
 _SIGNS = "|".join(map(re.escape, words("positive_stems") | words("negative_stems")))
 _ASIDE = re.compile(rf"(?i)\s*(?:\([^()]*\)|,\s(?:{_SIGNS})[^,;|\t]*)$")  # (tension positive); , positive in tension
+_CELLS_OF_NAME = re.compile(r"[,;|\t=:]|(?<=\w)\s[-–—]\s(?=[^\W\d_])")  # PT07;Stroke;mm; ai0 - stroke
 _MARK = re.compile(r"^(?:[\s#>•*|–-]|[0-9]{1,2}[.)]\s)+|[\s.|]+$")  # of a list or a table
 _COLON = re.compile(r"^([^:=]+)(?::\s+|\s*=\s*)([^\s:=]{1,12})$")  # force: N; force=N
 _PLAIN = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)?")
@@ -302,15 +303,24 @@ def _with_name_by_file(table: RawTable) -> RawTable:
 
 
 def _with_explained_names(table: RawTable) -> RawTable:
-    """Names of columns that say nothing, with what a line that begins with each says: PT07;Stroke;mm; y0 = load, N."""
-    lines = [[cell.strip(' "') for cell in re.split(r"[,;|\t=:]", line.strip(" |"))] for line in table.lines]
+    """Names of columns that say nothing, with what a line that begins with each says: PT07;Stroke;mm; y0 = load, N.
+
+    Of voltages the line may begin with a part of the name that no other has, Dev1_ai0, and state the scale.
+    """
+    lines = [[cell.strip(' "') for cell in _CELLS_OF_NAME.split(line.strip(" |"))] for line in table.lines]
+    keys = {cells[0] for cells in lines if re.search(r"[^\W\d_].*[0-9]", cells[0]) and len(cells) > 1}
+    parts = {key: [i for i, name in enumerate(table.names) if scales.has_name(name, key)] for key in keys}
     headings = {}
     for i, (name, header) in enumerate(zip(table.names, table.headers, strict=True)):
+        voltage = header.role == "voltage"
         called = {name.casefold(), header.name.casefold()} - {""}
-        own = [cells[1:] for cells in lines if header.role is None and cells[0].casefold() in called]
+        called |= {key.casefold() for key, columns in parts.items() if voltage and columns == [i]}
+        own = [cells[1:] for cells in lines if (header.role is None or voltage) and cells[0].casefold() in called]
         cells = own[0] if own and own.count(own[0]) == len(own) else []
         named = [c for c in cells if split_name(c).role and not (is_unit(c) or scales.senses_in(c))]
-        units = [] if any(map(scales.scales_in, cells)) else [cell for cell in cells if is_unit(cell.strip("[]()"))]
+        scaled = any(map(scales.scales_in, cells))
+        named = [c for c in named if not scales.scales_in(c)]
+        units = ["V"] * voltage if scaled else [cell for cell in cells if is_unit(cell.strip("[]()"))]
         if len({split_name(cell).role for cell in named}) == 1 and len(units) < 2:
             headings[i] = named[0], (header.unit, *units, "")[0 if header.unit else 1].strip("[]()")
     return table.named(headings) if len(headings) > 1 else table

@@ -54,7 +54,10 @@ _SENSE_NAMES = words("sense") | _CONVENTION
 _SENSES = {1: tuple(words("tension_stems")), -1: tuple(words("compression_stems"))}
 _POLARITIES = {1: tuple(words("positive_stems")), -1: tuple(words("negative_stems"))}
 _WORD = re.compile(r"[^\W\d_]+")
-_WORD_OR_SIGN = re.compile(r"[^\W\d_]+|(?<![\w+/-])[+-](?=\s*(?:[,;.)=]|$))")  # tension +, compression -
+_WORD_OR_SIGN = re.compile(  # tension +, compression gives minus, but no plus between two things
+    r"(?i)(?<![\w+/-])(?P<sign>[+-]|plus|minus)(?=\s*(?:[,;.()=]|$))|[^\W\d_]+"
+)
+_MARKS_OF = {"plus": "+", "minus": "-"}
 _PARTICLE = re.compile(r"とも|[とはがのを]")  # 変位と荷重は
 _CLAUSE = re.compile(r"[,;|\t，；。]|\.\s")
 _IS = {"i", "ist", "est", "e", "count"}  # without an s at the end: compression is positive
@@ -137,15 +140,16 @@ def _shifted_elsewhere(table: RawTable, column: int, own: str, role: str) -> boo
             continue
         if split_name("", number[2]).dimension not in (None, *_SIGNALS, DIMENSION.get(role)):
             continue
-        columns = {i for i, header in enumerate(table.headers) if _names(line, header.name)}
+        columns = {i for i, header in enumerate(table.headers) if has_name(line, header.name)}
         roles = {role_of(word) for word in words_of(line) if len(word) > 2}
         about_none = not columns and not roles - {None, "voltage", role} and match.start() == 0
-        if column in columns or _names(line, label) or about_none:
+        if column in columns or has_name(line, label) or about_none:
             return True
     return False
 
 
-def _names(line: str, name: str) -> bool:
+def has_name(line: str, name: str) -> bool:
+    """Tell if a line has a name as a word of its own."""
     return bool(name) and re.search(rf"(?<!\w){re.escape(name)}(?!\w)", line, re.IGNORECASE) is not None
 
 
@@ -179,7 +183,7 @@ def _stated_scale(table: RawTable, column: int, volts: Sequence[int]) -> tuple[s
                 has = any(header.dimension == DIMENSION.get(role) for header in table.headers)
                 if role not in ("", "voltage", "time") and meant and not has:
                     scales.append((role, unit, factor, line))
-        scales = [entry for entry in scales if _names(entry[3], name)] or scales
+        scales = [entry for entry in scales if has_name(entry[3], name)] or scales
         if scales:
             return scales[0] if len({entry[:3] for entry in scales}) == 1 else None
     return None
@@ -293,7 +297,8 @@ def _named(clause: str) -> set[str]:
 
 
 def _signs(stems: Mapping[int, tuple[str, ...]], clause: str) -> list[int]:
-    return [sign for word in _WORD_OR_SIGN.findall(clause) if (sign := _sign(stems, word))]
+    words = (_MARKS_OF.get(m["sign"].casefold(), m[0]) if m["sign"] else m[0] for m in _WORD_OR_SIGN.finditer(clause))
+    return [sign for word in words if (sign := _sign(stems, word))]
 
 
 def heads_senses(cell: str) -> bool:

@@ -92,7 +92,7 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
     if sampling.counts(row[0] for row in rows):
         lines = [*_with_name_of_numbers(lines[:first], separator, width), *lines[first:]]
     seconds = any(_SIMULINK in line for line in lines[:first])
-    lines = [*_without_keys(lines[:first], separator), *lines[first:]]
+    lines = [*_without_keys(_behind_labels(lines[:first], separator), separator), *lines[first:]]
     header, unit_row = _header_lines(lines, first, separator, width, source, form)
     if header is not None and not is_comment(lines[header]):
         sampling.split_strictly(lines[header], separator, source, header + 1)
@@ -148,6 +148,19 @@ def _with_name_of_numbers(above: Sequence[str], separator: str, width: int) -> l
     if len(named) != 1 or len(cells_of(above[named[0]], separator)) != width - 1:
         return list(above)
     return [f'""{separator}{line}' if i == named[0] else line for i, line in enumerate(above)]
+
+
+def _behind_labels(above: Sequence[str], separator: str) -> list[str]:
+    """Return lines above the rows, the value of all columns behind the label alone above it: dt:, 0.002, 0.002.
+
+    A step of that name, of a waveform of LabVIEW, is in seconds.
+    """
+    lines = list(above)
+    for i, label in enumerate(above[:-1]):
+        key, values = label.strip(), {cell for cell in cells_of(above[i + 1], separator) if cell}
+        if key.endswith(":") and separator not in key and len(values) == 1 and looks_numeric(value := values.pop()):
+            lines[i : i + 2] = f"{key} {value}{' s' * (key == 'dt:')}", ""
+    return lines
 
 
 def _without_keys(above: Sequence[str], separator: str) -> Iterator[str]:

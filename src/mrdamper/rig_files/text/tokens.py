@@ -159,7 +159,7 @@ def _notes(rows: Sequence[Sequence[str]], *, texts: bool) -> tuple[str, ...]:
     filled = Counter(i for row in rows for i, cell in enumerate(row) if cell)
     columns = {i for i, count in filled.items() if 2 * count > len(rows) > _ROWS}  # channels and labels, no notes
     stated = [
-        (key, number, unit if is_unit(unit) else "")
+        (key, number, unit if is_unit(unit) and looks_numeric(number) else "")
         for row in rows[:_ROWS]
         for i, (key, number, unit) in enumerate(zip(row, row[1:], [*row[2:], ""], strict=False))
         if key and number and not {i, i + 1} & columns and not looks_numeric(key) and (texts or looks_numeric(number))
