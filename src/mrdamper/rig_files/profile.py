@@ -111,7 +111,7 @@ class CurrentSource(Table):
     values: dict[NAME, Annotated[float, Field(allow_inf_nan=False, ge=-1000, le=1000)]] = Field(
         default_factory=dict, max_length=1000
     )
-    """[A], by patterns with * of file or test names, with their folders where the pattern has a slash."""
+    """[A], by patterns with * of file or test names, with their folders where the pattern has a slash; by a folder."""
     unit: Literal["A", "mA"] = "A"
     """Of the number in the file name."""
 
@@ -127,11 +127,17 @@ class CurrentSource(Table):
         return self
 
     def fitting(self, path: Path, test: str) -> list[str]:
-        """Return the patterns of `values` that match a file, or a test of it, whatever the case."""
+        """Return the patterns of `values` that match a file, a test of it, or its folder, whatever the case."""
         names = [name.casefold() for name in (path.name, path.stem, test) if name]
-        files = [f"{start}{path.as_posix()}".casefold() for start in ("", "/")]  # */a/test1.csv is a/test1.csv, too
-        whole = [*files, *(f"{file}/{test.casefold()}" for file in files if test)]
-        return [p for p in self.values if any(fnmatchcase(n, p.casefold()) for n in (whole if "/" in p else names))]
+        paths = [path.parts, *([(*path.parts, test)] if test else [])]
+        whole = [f"{start}{'/'.join(of)}" for of in paths for start in ("", "/")]  # */a/test1.csv is a/test1.csv, too
+        fitting = []
+        for pattern in self.values:
+            ends = ["/".join(of[-1 - pattern.count("/") :]) for of in paths]
+            texts = [text.casefold() for text in (*whole, *ends)] if "/" in pattern else names
+            matches = any(fnmatchcase(text, pattern.casefold()) for text in texts)
+            fitting += [pattern] if matches or pattern.casefold() == path.parent.name.casefold() else []
+        return fitting
 
 
 class Correction(Table):
@@ -194,8 +200,8 @@ class Profile(Table):
         source = self.current or CurrentSource(value=0.0)
         absent = set(source.values).difference(*(source.fitting(path, test) for path, test in tests))
         if absent:
-            problem = f"no file or test is called {', '.join(repr(pattern) for pattern in sorted(absent))}"
-            remedy = "write names of files or tests, with * for anything"
+            problem = f"no file, test or folder is called {', '.join(repr(pattern) for pattern in sorted(absent))}"
+            remedy = "write names of files or tests, with * for anything, or of folders of tests"
             raise ProfileError(problem, where="[current.values]", remedy=remedy)
 
     def leaves_out(self, *parts: str) -> bool:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
 from glob import escape
 from itertools import chain
 from pathlib import Path
@@ -17,7 +18,7 @@ from mrdamper.rig_files.file_records import files_in, headings_of, unpacked
 from mrdamper.rig_files.mapping.companions import files_by_kind, with_files
 from mrdamper.rig_files.mapping.description import is_readme
 from mrdamper.rig_files.preview import columns_of, guess_profile, unset_keys
-from mrdamper.rig_files.profile import Profile, profile_text, toml
+from mrdamper.rig_files.profile import Channel, Profile, profile_text, toml
 from mrdamper.rig_files.record import Refusal
 from mrdamper.rig_files.rig_import import ImportResult, import_files, read_runs
 
@@ -37,9 +38,12 @@ def profile_template(paths: Sequence[str | Path], profile: Profile) -> tuple[str
         kinds = {kind: headings_of(path, profile) for kind, path in files_by_kind(refused, profile).items()}
         if kinds:
             guess = with_files(guess, kinds)
-            errors = [refusal.error for refusal in import_files(paths, guess).refusals]
+            refusals = import_files(paths, guess).refusals
+            errors = [refusal.error for refusal in refusals]
             alike = {re.sub("[0-9]+", "#", e.found): f"{e.found}; {e.remedy} [{e.code}]" for e in reversed(errors)}
-            return profile_text(guess) + _alternatives(columns, kinds), [*alike.values()][::-1]
+            whole = guess.current is not None or "current" in guess.channels
+            missing = _missing_currents(() if whole else _of_tests(refusals, kinds), {})
+            return profile_text(guess) + _alternatives(columns, kinds) + missing, [*alike.values()][::-1]
         try:
             read_runs(first, guess)
         except InputError as error:
@@ -66,6 +70,19 @@ def _file_for_profile(paths: Sequence[str | Path], profile: Profile) -> Iterator
         names = {Path(record.provenance["file"]).name for record in result.records}
         tests = (file for file in files if file.name in names or (not names and file.name not in result.left_out))
         yield next(chain(first, tests), files[0]), first
+
+
+def _of_tests(refusals: Sequence[Refusal], kinds: Collection[str]) -> list[Refusal]:
+    """Return the refusals of files of some channels as those of their tests, one a test."""
+    of_kinds = [Profile(channels={"force": Channel(file=kind)}) for kind in kinds]
+    missing = [r for r in refusals if r.error.code == "E_CURRENT_MISSING" or CURRENT_TOO in r.error.remedy]
+    tests: dict[tuple[Path, str], Refusal] = {}
+    for refusal in missing:
+        path = Path(refusal.file)
+        runs = [refusal.run, *(of_kind.of_file(path)[0] for of_kind in of_kinds)]
+        run = next(filter(None, runs), path.stem)
+        tests.setdefault((path.parent, run), replace(refusal, file=str(path.with_name(f"*{run}")), run=run))
+    return [*tests.values()]
 
 
 def _missing_currents(refusals: Sequence[Refusal], columns: Mapping[int, str]) -> str:

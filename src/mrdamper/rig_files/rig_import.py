@@ -18,6 +18,7 @@ from mrdamper.data import Dataset
 from mrdamper.data.displayable import Displayable
 from mrdamper.data.progress import Progress, silent
 from mrdamper.data.temporary import without_temporary_folder
+from mrdamper.data.wording import counted
 from mrdamper.errors import ColumnError, CombinedError, InputError, is_a, shown, validate_arguments
 from mrdamper.rig_files import coil_current
 from mrdamper.rig_files.file_records import clock_of, files_in, headings_of, records_of_file, unpacked
@@ -193,6 +194,7 @@ class _Intake:
         self._shares: dict[Path, tuple[str, Profile]] = {}  # files of some channels each, by the profile
         self._results = cache(plans.results_of)  # the table of results that a file holds
         self._plans: list[Path] = []  # which gave tests their current
+        self._awaited: set[Path] = set()  # plans of the tests of files that lack columns
         self._folders: list[Path] = []  # of tests with a plan of their own each, where every test lies in one of them
 
     def read(self, path: Path, *, given: bool) -> None:
@@ -319,6 +321,7 @@ class _Intake:
         records = [record for _, record in self.tests()]
         for i, finding in (*stated_as_amplitudes(records).items(), *in_another_unit(records).items()):
             self._exchange(records[i], records[i].noticed(finding))
+        self._await_columns(every)
         return used
 
     def reason(self, note: Refusal) -> str:
@@ -326,10 +329,23 @@ class _Intake:
         results = self._results(Path(note.file))
         if results is None:
             return note.error.found
+        if Path(note.file) in self._awaited:
+            return f"currents under {results.title!r}, used once the columns are known"
         keys = ", ".join(filter(None, results.keys))
-        missing = any(refusal.error.code == "E_CURRENT_MISSING" for refusal in self.refusals)
-        why = f": no column beside it names every test ({keys or 'none'})" if missing else ""
+        missing = [refusal for refusal in self.refusals if refusal.error.code == "E_CURRENT_MISSING"]
+        rows = f"{counted(len(results.cells), 'row')} for {counted(len(missing), 'test')}, "
+        rows *= len(results.cells) != len(missing)
+        why = f": {rows}no column beside it names every test ({keys or 'none'})" if missing else ""
         return f"currents under {results.title!r}, not used{why}"
+
+    def _await_columns(self, paths: Iterable[Path]) -> None:
+        """Ask for no currents beside columns, where the table of a file names every file that lacks these."""
+        asked = [refusal.error for refusal in self.refusals if coil_current.CURRENT_TOO in refusal.error.remedy]
+        files = [Path(refusal.file) for refusal in self.refusals if refusal.error in asked]
+        stated = ((path, self._results(path)) for path in (paths if files else ()))
+        self._awaited = {path for path, results in stated if results and plans.names_files(results, files)}
+        for error in asked if self._awaited else ():
+            error.remedy = error.remedy.partition(f"; {coil_current.CURRENT_TOO}")[0]
 
     def _is_beside_tests(self, path: Path) -> bool:
         alone = [other.suffix for other in self._order].count(path.suffix) == 1 < len(self._order)

@@ -275,6 +275,16 @@ def named_tests(results: Results | None, tests: Tests) -> list[int]:
     return [i for i, names in enumerate(_called(tests)) if (cells - {""}) & {name.casefold() for name in names}]
 
 
+def names_files(results: Results, files: Sequence[Path]) -> bool:
+    """Tell if the rows of a table of results name files, or the folder of each test, that cannot be read yet."""
+    folders = [(folder.name,) for folder in dict.fromkeys(file.parent for file in files)]
+    for tests in ([(file.stem, file.name, "\\".join(file.parts[-2:])) for file in files], folders):
+        stated = results.by_test(tests, whole_names=True) or results.by_test(tests)
+        if len(stated) == len(tests) and not results.of_supply:
+            return True
+    return False
+
+
 def misfit_of_plan(path: Path, results: Results | None, tests: Tests) -> Finding | None:
     """Return the finding that a plan, which names most tests without a current, has one twice or lacks others."""
     text = results.misfit(_called(tests)) if results else ""
@@ -370,17 +380,21 @@ def rests(record: Record) -> bool:
 def tests_by(path: Path, results: Results, profile: Profile) -> list[Record]:
     """The tests of a file whose column numbers them as a table of results does, without pauses in which it rests.
 
-    Empty if it has no such column.
+    Empty if it has no such column, or one that numbers motions without a row.
     """
     try:
         with raw_tables(path, profile.file) as tables:
-            column = results.column_of_tests(tables[0]) if len(tables) == 1 else None
+            every = results.column_of_tests(tables[0]) if len(tables) == 1 else None
+            column = every or (results.column_of_tests(tables[0], with_rests=True) if len(tables) == 1 else None)
         if column is None:
             return []
         form = profile.file.model_copy(update={"run_column": column})
         records, _ = records_of_file(path, profile.model_copy(update={"file": form}))
         largest = max(float(np.ptp(record.displacement)) for record in records)
         moving = [record for record in records if not rests(record)]
-        return [r for r in moving if np.ptp(r.displacement) > _REST * largest or not results.lacks_current(path, r.id)]
+        far = [np.ptp(record.displacement) > _REST * largest for record in moving]
+        if every is None:
+            return [r for r, of in zip(moving, far, strict=True) if of] if sum(far) == len(results.cells) else []
+        return [r for r, of in zip(moving, far, strict=True) if of or not results.lacks_current(path, r.id)]
     except InputError:
         return []

@@ -257,15 +257,20 @@ class Results:
         cells = [row[columns[0][0]].replace(",", ".") for row in self.cells] if len(columns) == 1 else []
         return [columns[0][1].factor * float(cell) for cell in cells] if all(map(NUMBER.fullmatch, cells)) else []
 
-    def column_of_tests(self, table: RawTable) -> str | None:
-        """Return the column of a record that numbers its tests as a column of this table, of the same name, does."""
+    def column_of_tests(self, table: RawTable, *, with_rests: bool = False) -> str | None:
+        """Return the column of a record that numbers its tests as a column of this table, of the same name, does.
+
+        `with_rests`: it may number rests between the tests, too, which have no row.
+        """
         for i, name in enumerate(table.names if table.words is not None else ()):
             own = _key(split_name(name).name)
             at = [k for k, key in enumerate(self.keys) if key and _key(split_name(key).name) == own]
             if len(at) != 1 or table.words is None:
                 continue
             numbers = {_key(label) for label in table.words(i).labels} - {""}
-            if len(numbers) > 1 and numbers <= {_key(cells[at[0]]) for cells in (*self.cells, *self.pauses)}:
+            rows = {_key(cells[at[0]]) for cells in (*self.cells, *self.pauses)}
+            between = with_rests and rows <= numbers and len(numbers) <= 2 * len(rows) + 1
+            if len(numbers) > 1 and (numbers <= rows or between):
                 return name
         return None
 

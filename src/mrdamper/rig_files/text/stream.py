@@ -11,7 +11,7 @@ from typing import IO
 
 import numpy as np
 
-from mrdamper.rig_files.column_names import role_of
+from mrdamper.rig_files.column_names import TABLES, role_of
 from mrdamper.rig_files.conditions import stated_by_lines, stated_in_titles
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import RigFileError, Source, scratch
@@ -37,6 +37,7 @@ _SEGMENT = re.compile(r"(?:Channels|Samples|Date|Time|Y_Unit_Label|X_Dimension|X
 # A line that may state a current.
 _STATED = re.compile(rb"(?m)^[ \t]*(?:[#%\"A-Za-z]|//)[^\n]*[0-9] ?(?:m?A|amp)[^\n]*")
 _WORD = re.compile(r"[^\W\d_]{2,}")
+_KNOWN = frozenset(word for of in TABLES["words"].values() for word in of)
 _NUMBERS = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)*")
 _TITLE_LINES = 20  # among which rows follow such a line
 _LOOK_BACK = 64 * 1024  # bytes of remarks there may be above a repeated header
@@ -192,12 +193,13 @@ def _not_unicode(head: bytes) -> str:
 
 
 def _telling_words(text: bytes, encoding: str) -> int:
-    """Words beyond ASCII that name channels, were the text in this encoding."""
+    """Words beyond ASCII that name channels, or mean something else known, were the text in this encoding."""
     try:
         words = re.findall(r"[^\W\d_]+", text.decode(encoding))
     except UnicodeDecodeError:
         return -1
-    return sum(not word.isascii() and role_of(word) is not None for word in words)
+    words = [word for word in words if not word.isascii()]
+    return sum(role_of(word) is not None or word.casefold() in _KNOWN for word in words)
 
 
 def _as_utf8(source: Source, encoding: str, mark: int) -> tuple[IO[bytes], int]:

@@ -163,5 +163,6 @@ def _notes(rows: Sequence[Sequence[str]], *, texts: bool) -> tuple[str, ...]:
         for row in rows[:_ROWS]
         for i, (key, number, unit) in enumerate(zip(row, row[1:], [*row[2:], ""], strict=False))
         if key and number and not {i, i + 1} & columns and not looks_numeric(key) and (texts or looks_numeric(number))
-    ]
+        and not (is_unit(number) and i and row[i - 1])  # Source, CH1, Second: seconds are those of the time
+    ]  # fmt: skip
     return tuple(f"{key}: {number} {unit}".rstrip() for key, number, unit in stated)[:_ROWS]
