@@ -128,16 +128,11 @@ class CurrentSource(Table):
 
     def fitting(self, path: Path, test: str) -> list[str]:
         """Return the patterns of `values` that match a file, a test of it, or its folder, whatever the case."""
-        names = [name.casefold() for name in (path.name, path.stem, test) if name]
-        paths = [path.parts, *([(*path.parts, test)] if test else [])]
-        whole = [f"{start}{'/'.join(of)}" for of in paths for start in ("", "/")]  # */a/test1.csv is a/test1.csv, too
-        fitting = []
-        for pattern in self.values:
-            ends = ["/".join(of[-1 - pattern.count("/") :]) for of in paths]
-            texts = [text.casefold() for text in (*whole, *ends)] if "/" in pattern else names
-            matches = any(fnmatchcase(text, pattern.casefold()) for text in texts)
-            fitting += [pattern] if matches or pattern.casefold() == path.parent.name.casefold() else []
-        return fitting
+        names = [f"/{name}".casefold() for name in (path.name, path.stem, test) if name]
+        whole, folder = [f"/{path.as_posix()}{end}".casefold() for end in ("", f"/{test}")], path.parent.name.casefold()
+        texts = {pattern: whole if "/" in pattern else names for pattern in self.values}  # a/test1.csv, */a/test1.csv
+        fits = {p: any(fnmatchcase(text, f"*/{p.casefold()}") for text in of) for p, of in texts.items()}
+        return [pattern for pattern in self.values if fits[pattern] or pattern.casefold() == folder]
 
 
 class Correction(Table):

@@ -39,11 +39,11 @@ def profile_template(paths: Sequence[str | Path], profile: Profile) -> tuple[str
         if kinds:
             guess = with_files(guess, kinds)
             refusals = import_files(paths, guess).refusals
-            errors = [refusal.error for refusal in refusals]
-            alike = {re.sub("[0-9]+", "#", e.found): f"{e.found}; {e.remedy} [{e.code}]" for e in reversed(errors)}
-            whole = guess.current is not None or "current" in guess.channels
-            missing = _missing_currents(() if whole else _of_tests(refusals, kinds), {})
-            return profile_text(guess) + _alternatives(columns, kinds) + missing, [*alike.values()][::-1]
+            errors = (refusal.error for refusal in reversed(refusals))
+            alike = {re.sub("[0-9]+", "#", e.found): f"{e.found}; {e.remedy} [{e.code}]" for e in errors}
+            open_tests = () if guess.current or "current" in guess.channels else _of_tests(refusals, kinds)
+            text = profile_text(guess) + _alternatives(columns, kinds) + _missing_currents(open_tests, {})
+            return text, [*alike.values()][::-1]
         try:
             read_runs(first, guess)
         except InputError as error:
@@ -75,12 +75,10 @@ def _file_for_profile(paths: Sequence[str | Path], profile: Profile) -> Iterator
 def _of_tests(refusals: Sequence[Refusal], kinds: Collection[str]) -> list[Refusal]:
     """Return the refusals of files of some channels as those of their tests, one a test."""
     of_kinds = [Profile(channels={"force": Channel(file=kind)}) for kind in kinds]
-    missing = [r for r in refusals if r.error.code == "E_CURRENT_MISSING" or CURRENT_TOO in r.error.remedy]
     tests: dict[tuple[Path, str], Refusal] = {}
-    for refusal in missing:
+    for refusal in (r for r in refusals if r.error.code == "E_CURRENT_MISSING" or CURRENT_TOO in r.error.remedy):
         path = Path(refusal.file)
-        runs = [refusal.run, *(of_kind.of_file(path)[0] for of_kind in of_kinds)]
-        run = next(filter(None, runs), path.stem)
+        run = next(filter(None, (refusal.run, *(of_kind.of_file(path)[0] for of_kind in of_kinds))), path.stem)
         tests.setdefault((path.parent, run), replace(refusal, file=str(path.with_name(f"*{run}")), run=run))
     return [*tests.values()]
 

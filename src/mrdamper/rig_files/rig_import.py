@@ -333,18 +333,17 @@ class _Intake:
             return f"currents under {results.title!r}, used once the columns are known"
         keys = ", ".join(filter(None, results.keys))
         missing = [refusal for refusal in self.refusals if refusal.error.code == "E_CURRENT_MISSING"]
-        rows = f"{counted(len(results.cells), 'row')} for {counted(len(missing), 'test')}, "
-        rows *= len(results.cells) != len(missing)
-        why = f": {rows}no column beside it names every test ({keys or 'none'})" if missing else ""
+        counts = f"{counted(len(results.cells), 'row')} for {counted(len(missing), 'test')}, "
+        counts *= len(results.cells) != len(missing)
+        why = f": {counts}no column beside it names every test ({keys or 'none'})" if missing else ""
         return f"currents under {results.title!r}, not used{why}"
 
     def _await_columns(self, paths: Iterable[Path]) -> None:
         """Ask for no currents beside columns, where the table of a file names every file that lacks these."""
-        asked = [refusal.error for refusal in self.refusals if coil_current.CURRENT_TOO in refusal.error.remedy]
-        files = [Path(refusal.file) for refusal in self.refusals if refusal.error in asked]
-        stated = ((path, self._results(path)) for path in (paths if files else ()))
-        self._awaited = {path for path, results in stated if results and plans.names_files(results, files)}
-        for error in asked if self._awaited else ():
+        asked = {Path(r.file): r.error for r in self.refusals if coil_current.CURRENT_TOO in r.error.remedy}
+        stated = ((path, self._results(path)) for path in (paths if asked else ()))
+        self._awaited = {path for path, results in stated if results and plans.names_files(results, [*asked])}
+        for error in asked.values() if self._awaited else ():
             error.remedy = error.remedy.partition(f"; {coil_current.CURRENT_TOO}")[0]
 
     def _is_beside_tests(self, path: Path) -> bool:

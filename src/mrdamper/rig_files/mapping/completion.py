@@ -305,21 +305,20 @@ def _with_name_by_file(table: RawTable) -> RawTable:
 def _with_explained_names(table: RawTable) -> RawTable:
     """Names of columns that say nothing, with what a line that begins with each says: PT07;Stroke;mm; y0 = load, N.
 
-    Of voltages the line may begin with a part of the name that no other has, Dev1_ai0, and state the scale.
+    Of a voltage the line may begin with a part of its name alone, Dev1_ai0, and state the scale.
     """
     lines = [[cell.strip(' "') for cell in _CELLS_OF_NAME.split(line.strip(" |"))] for line in table.lines]
-    keys = {cells[0] for cells in lines if re.search(r"[^\W\d_].*[0-9]", cells[0]) and len(cells) > 1}
-    parts = {key: [i for i, name in enumerate(table.names) if scales.has_name(name, key)] for key in keys}
+    parts = {cells[0] for cells in lines if len(cells) > 1 and re.search(r"[^\W\d_].*[0-9]", cells[0])}
+    parts = {part: [scales.has_name(name, part) for name in table.names] for part in parts}
     headings = {}
     for i, (name, header) in enumerate(zip(table.names, table.headers, strict=True)):
         voltage = header.role == "voltage"
         called = {name.casefold(), header.name.casefold()} - {""}
-        called |= {key.casefold() for key, columns in parts.items() if voltage and columns == [i]}
+        called |= {part.casefold() for part, of in parts.items() if voltage and of[i] and sum(of) == 1}
         own = [cells[1:] for cells in lines if (header.role is None or voltage) and cells[0].casefold() in called]
         cells = own[0] if own and own.count(own[0]) == len(own) else []
-        named = [c for c in cells if split_name(c).role and not (is_unit(c) or scales.senses_in(c))]
-        scaled = any(map(scales.scales_in, cells))
-        named = [c for c in named if not scales.scales_in(c)]
+        scaled = [cell for cell in cells if scales.scales_in(cell)]
+        named = [c for c in cells if split_name(c).role and not (c in scaled or is_unit(c) or scales.senses_in(c))]
         units = ["V"] * voltage if scaled else [cell for cell in cells if is_unit(cell.strip("[]()"))]
         if len({split_name(cell).role for cell in named}) == 1 and len(units) < 2:
             headings[i] = named[0], (header.unit, *units, "")[0 if header.unit else 1].strip("[]()")
@@ -383,8 +382,8 @@ def _with_listed_units(table: RawTable) -> RawTable:
     doubtful: dict[int, set[str]] = {}  # of a range, a figure or a numbered device: may contradict the others
     for line in table.lines if names else ():
         cells = cells_of_list(line.lstrip("#%/ "))
-        behind_colon = [cell.partition(": ")[2] for cell in cells]  # rig 7, columns: time [s], load [N]
-        for text, whole in zip((*cells, *behind_colon, line), (*cells, *cells, line), strict=True):
+        behind_colon = [cell.partition(": ")[2] for cell in (*cells, line)]  # rig 7, columns: time [s], load [N]
+        for text, whole in zip((*cells, *behind_colon, line), (*cells, *cells, line, line), strict=True):
             header = item_of(text)
             name, meaning = (part.strip("`* ") for part in _BEHIND_NAME.split(header.name, maxsplit=1))
             first, _, rest = name.partition(" ")

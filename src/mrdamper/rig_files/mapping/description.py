@@ -64,6 +64,7 @@ _RECORDER = re.compile(
 _LARGEST = 2**18  # bytes
 _TEX = re.compile(r"\\\\.*|[${}]")  # around the cells of a table in LaTeX
 _ITEM = re.compile(r"(\w+[({]\d+[)}])\.(\w+) *= *['\"]?([^;'\"\n]+)")  # d(1).current = 0.5;
+_ARRAY = re.compile(r"(?m)^\s*(\w+) *= *\[([-+0-9.eE,; \t]+)\] *;? *%+ *(\S.*)$")  # I = [0 0.5 1];  % coil current, A
 _RULE = re.compile(r"[\s|:+=-]*")  # below the names of columns of a table in Markdown
 _DEEPEST, _FEWEST_TESTS = 6, 2
 _MOST_LEVELS = 50  # of a text in YAML
@@ -158,7 +159,7 @@ def _of_channels(line: str) -> str:
         return ", ".join([f"channel {cells[0]}: {meaning}", *senses])
     if len(cells) > 1 and split_name(cells[0]).role and all(c.isascii() and c.isdigit() for c in cells[1:]):
         return f"channel {cells[1]}: {cells[0]}"  # a tag with its index, and its type
-    units = [item_of(cell).unit or cell.rpartition(":")[2].strip() for cell in cells]
+    units = [item_of(cell).unit or cell.rpartition(":")[2].strip() for cell in (*cells, line.partition(": ")[2])]
     stated = scales.scales_in(line) or scales.states_shift(line) or states_si(line) or states_volts(line)
     of_tests = stated_by_lines([line], ".") or stated_motion(stated_quantities([line]))
     return line if stated or (any(map(is_unit, units)) and not of_tests) else ""
@@ -230,7 +231,7 @@ def short_lines(path: Path) -> list[str]:
     text = _TEX.sub("", text).replace("&", "|") if suffix == ".tex" else text
     text = re.sub(r"(?<=\w)_\*", "", text)  # t_* time (s), of t_I0, t_I1
     lines = [line for line in text.splitlines() if "|" not in line or not _RULE.fullmatch(line)]
-    lines += _items_assigned(text) if suffix == ".m" else ()
+    lines += (*_items_assigned(text), *_arrays_assigned(text)) if suffix == ".m" else ()
     return _by_headings(lines) if len(lines) <= _MOST_LISTED else lines
 
 
@@ -241,6 +242,18 @@ def _items_assigned(text: str) -> Iterator[str]:
         items.setdefault(item, {})[key] = numbers_in(value)
     units = {key: unit for key, unit in re.findall(r"(\w+)\s*[:=]\s*([^\W\d]+)", text) if is_unit(unit)}
     yield from _stated([*items.values()], "", units)
+
+
+def _arrays_assigned(text: str) -> Iterator[str]:
+    """Yield as a table the arrays of one length that a script assigns, with the name and unit of a comment each."""
+    arrays: dict[int, dict[str, list[str]]] = {}
+    for name, numbers, comment in _ARRAY.findall(text):
+        header = item if (item := item_of(comment)).unit else column_names.Header(name, comment.strip())
+        if is_unit(header.unit):
+            own = numbers.replace(",", " ").replace(";", " ").split()
+            arrays.setdefault(len(own), {})[f"{header.name} [{header.unit}]"] = own
+    for columns in (of for size, of in arrays.items() if size >= _FEWEST_TESTS):
+        yield from ("\t".join(row) for row in (columns, *zip(*columns.values(), strict=True)))
 
 
 def _by_headings(lines: list[str]) -> list[str]:

@@ -13,7 +13,7 @@ from mrdamper.data.wording import number
 from mrdamper.errors import InputError, QualityError, listed, printable
 from mrdamper.rig_files import conditions
 from mrdamper.rig_files.coil_current import NO_CHANNEL
-from mrdamper.rig_files.column_names import is_called, words, words_of
+from mrdamper.rig_files.column_names import is_called, split_name, words, words_of
 from mrdamper.rig_files.file_records import records_of_file
 from mrdamper.rig_files.mapping.comparisons import forces_grow
 from mrdamper.rig_files.mapping.completion import completed
@@ -57,7 +57,8 @@ _STAMP = re.compile(  # 20190603_140512, 2019-06-03T14:05:12
 def results_of(path: Path) -> Results | None:
     """Return the table of results that a file holds; None if it holds none."""
     if path.suffix.lower() in SHORT_TEXTS and (stated := results_in(short_lines(path))):
-        return stated
+        arrays = path.suffix.lower() == ".m" and all(split_name(key).unit for key in stated.keys)  # of a script
+        return replace(stated, of_supply=stated.of_supply or arrays)
 
     def results_apart(tables: Sequence[RawTable]) -> list[tuple[str, Results]]:
         every = ((t.label, results_in(lines_of(completed(with_notes(t, path, Profile()))))) for t in tables[:20])
@@ -278,11 +279,9 @@ def named_tests(results: Results | None, tests: Tests) -> list[int]:
 def names_files(results: Results, files: Sequence[Path]) -> bool:
     """Tell if the rows of a table of results name files, or the folder of each test, that cannot be read yet."""
     folders = [(folder.name,) for folder in dict.fromkeys(file.parent for file in files)]
-    for tests in ([(file.stem, file.name, "\\".join(file.parts[-2:])) for file in files], folders):
-        stated = results.by_test(tests, whole_names=True) or results.by_test(tests)
-        if len(stated) == len(tests) and not results.of_supply:
-            return True
-    return False
+    names = [(file.stem, file.name, "\\".join(file.parts[-2:])) for file in files]
+    stated = [(results.by_test(of, whole_names=True) or results.by_test(of), of) for of in (names, folders)]
+    return not results.of_supply and any(len(rows) == len(of) for rows, of in stated)
 
 
 def misfit_of_plan(path: Path, results: Results | None, tests: Tests) -> Finding | None:
@@ -384,17 +383,17 @@ def tests_by(path: Path, results: Results, profile: Profile) -> list[Record]:
     """
     try:
         with raw_tables(path, profile.file) as tables:
-            every = results.column_of_tests(tables[0]) if len(tables) == 1 else None
-            column = every or (results.column_of_tests(tables[0], with_rests=True) if len(tables) == 1 else None)
+            columns = [results.column_of_tests(*tables, with_rests=of) for of in (False, True) if len(tables) == 1]
+        column = next(filter(None, columns), None)
         if column is None:
             return []
         form = profile.file.model_copy(update={"run_column": column})
         records, _ = records_of_file(path, profile.model_copy(update={"file": form}))
         largest = max(float(np.ptp(record.displacement)) for record in records)
         moving = [record for record in records if not rests(record)]
-        far = [np.ptp(record.displacement) > _REST * largest for record in moving]
-        if every is None:
-            return [r for r, of in zip(moving, far, strict=True) if of] if sum(far) == len(results.cells) else []
-        return [r for r, of in zip(moving, far, strict=True) if of or not results.lacks_current(path, r.id)]
+        rows = None if columns[0] else len(results.cells)  # and rests without one
+        far = (np.ptp(record.displacement) > _REST * largest for record in moving)
+        tests = [r for r, of in zip(moving, far, strict=True) if of or not (rows or results.lacks_current(path, r.id))]
+        return tests if rows in (None, len(tests)) else []
     except InputError:
         return []

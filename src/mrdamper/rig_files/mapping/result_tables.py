@@ -36,9 +36,10 @@ _FEWEST_CHANNELS = 2  # of a table of samples
 _MOST_ROWS, _MOST_COLUMNS = 2000, 60  # of a table of results
 _TO = r"\s*(?:[-–]|\.{2,3}|\b(?:to|bis|do|à|au|a|al|até|se)\b)\s*"
 _NUMBERS = re.compile(rf"([0-9]{{1,4}})(?:{_TO}([0-9]{{1,4}}))?")
+_MARKS = "_.#-"  # between a name and its number
 _LISTED_TEST = re.compile(  # Step 3: ...; tests 1 - 4: ...; files p01 to p04: ...; T1 se T4 tak: ...; 3. test: ...
     r"[\s#%*\"-]*(?:(?P<place>[0-9]{1,6})[.)]\s*(?P<word>[^\W\d_]{2,20})"
-    r"|(?P<name>[^\W\d_][^\d:=]{0,30}?)(?P<mark>[\s_.#-]*)(?P<number>[0-9]{1,6})(?:"
+    rf"|(?P<name>[^\W\d_][^\d:=]{{0,30}}?)(?P<mark>[\s{_MARKS}]*)(?P<number>[0-9]{{1,6}})(?:"
     rf"{_TO}(?:[^\W\d_]{{1,30}}[\s_.#]*)?(?P<last>[0-9]{{1,6}})(?:\s+tak)?)?)\s*[:=;,\t)]"
 )
 _MEASURED = tuple(words("measured"))
@@ -104,7 +105,7 @@ def numbered_tests(lines: Sequence[str]) -> Results | None:
 
 
 def _numbered_tests(lines: Iterable[str], *, of_supply: bool = False) -> Results | None:
-    rows = list[tuple[str, str, str, float, str]]()
+    rows = list[tuple[str, str, float, str]]()
     for match in filter(None, map(_LISTED_TEST.match, lines)):
         text, name, first = match.string[match.end() :].strip(), match["name"], match["number"]
         if match["word"] and match["word"].casefold() in COUNTED:
@@ -112,14 +113,14 @@ def _numbered_tests(lines: Iterable[str], *, of_supply: bool = False) -> Results
         numbers = range(int(first or 0), int(match["last"] or first or -1) + 1)[:_MOST_ROWS]
         stated = currents_in_order(text) or currents_in(text) * len(numbers)
         if name and len(stated) == len(numbers) and not holds(name, COIL):
-            mark = (match["mark"] or "").strip()
-            rows += [(name.strip(), mark, f"{n:0{len(first)}d}", of, text) for n, of in zip(numbers, stated, strict=True)]
-    numbers = {(name.casefold(), int(number)) for name, _, number, *_ in rows}
+            numbered = [f"{(match['mark'] or '').strip()}{n:0{len(first)}d}" for n in numbers]  # _1 of scope_1
+            rows += [(name.strip(), *of, text) for of in zip(numbered, stated, strict=True)]
+    numbers = {(name.casefold(), int(number.lstrip(_MARKS))) for name, number, *_ in rows}
     if len(numbers) < _FEWEST_ROWS or len(numbers) < len(rows) or len({name for name, _ in numbers}) > 1:
         return None
-    cells = tuple((f"{name.split()[-1]}{mark}{number}", number, text) for name, mark, number, _, text in rows)
+    cells = tuple((f"{name.split()[-1]}{number}", number.lstrip(_MARKS), text) for name, number, _, text in rows)
     counts = any({word.casefold(), word.casefold().rstrip("s")} & COUNTED for word in words_of(rows[0][0]))
-    currents, keys = tuple(row[3] for row in rows), ("", rows[0][0], "remark")
+    currents, keys = tuple(row[2] for row in rows), ("", rows[0][0], "remark")
     return Results(currents, cells, "a line for each test", keys, of_supply, counts_tests=counts)
 
 

@@ -258,10 +258,7 @@ class Results:
         return [columns[0][1].factor * float(cell) for cell in cells] if all(map(NUMBER.fullmatch, cells)) else []
 
     def column_of_tests(self, table: RawTable, *, with_rests: bool = False) -> str | None:
-        """Return the column of a record that numbers its tests as a column of this table, of the same name, does.
-
-        `with_rests`: it may number rests between the tests, too, which have no row.
-        """
+        """Return the column of a record that numbers tests, or rests between them, as one of its name here does."""
         for i, name in enumerate(table.names if table.words is not None else ()):
             own = _key(split_name(name).name)
             at = [k for k, key in enumerate(self.keys) if key and _key(split_name(key).name) == own]

@@ -55,9 +55,8 @@ _SENSES = {1: tuple(words("tension_stems")), -1: tuple(words("compression_stems"
 _POLARITIES = {1: tuple(words("positive_stems")), -1: tuple(words("negative_stems"))}
 _WORD = re.compile(r"[^\W\d_]+")
 _WORD_OR_SIGN = re.compile(  # tension +, compression gives minus, but no plus between two things
-    r"(?i)(?<![\w+/-])(?P<sign>[+-]|plus|minus)(?=\s*(?:[,;.()=]|$))|[^\W\d_]+"
+    r"(?i)(?<![\w+/-])(?:(?P<plus>\+|plus)|(?P<minus>-|minus))(?=\s*(?:[,;.()=]|$))|[^\W\d_]+"
 )
-_MARKS_OF = {"plus": "+", "minus": "-"}
 _PARTICLE = re.compile(r"とも|[とはがのを]")  # 変位と荷重は
 _CLAUSE = re.compile(r"[,;|\t，；。]|\.\s")
 _IS = {"i", "ist", "est", "e", "count"}  # without an s at the end: compression is positive
@@ -297,8 +296,8 @@ def _named(clause: str) -> set[str]:
 
 
 def _signs(stems: Mapping[int, tuple[str, ...]], clause: str) -> list[int]:
-    words = (_MARKS_OF.get(m["sign"].casefold(), m[0]) if m["sign"] else m[0] for m in _WORD_OR_SIGN.finditer(clause))
-    return [sign for word in words if (sign := _sign(stems, word))]
+    texts = ("+" if m["plus"] else "-" if m["minus"] else m[0] for m in _WORD_OR_SIGN.finditer(clause))
+    return [sign for text in texts if (sign := _sign(stems, text))]
 
 
 def heads_senses(cell: str) -> bool:

@@ -151,10 +151,7 @@ def _with_name_of_numbers(above: Sequence[str], separator: str, width: int) -> l
 
 
 def _behind_labels(above: Sequence[str], separator: str) -> list[str]:
-    """Return lines above the rows, the value of all columns behind the label alone above it: dt:, 0.002, 0.002.
-
-    A step of that name, of a waveform of LabVIEW, is in seconds.
-    """
+    """Return lines above the rows, the value of all columns behind the label alone above it: dt:, 0.002, 0.002, in s."""
     lines = list(above)
     for i, label in enumerate(above[:-1]):
         key, values = label.strip(), {cell for cell in cells_of(above[i + 1], separator) if cell}

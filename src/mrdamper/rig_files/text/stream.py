@@ -198,8 +198,7 @@ def _telling_words(text: bytes, encoding: str) -> int:
         words = re.findall(r"[^\W\d_]+", text.decode(encoding))
     except UnicodeDecodeError:
         return -1
-    words = [word for word in words if not word.isascii()]
-    return sum(role_of(word) is not None or word.casefold() in _KNOWN for word in words)
+    return sum(not w.isascii() and (role_of(w) is not None or w.casefold() in _KNOWN) for w in words)
 
 
 def _as_utf8(source: Source, encoding: str, mark: int) -> tuple[IO[bytes], int]:
