@@ -383,6 +383,23 @@ def test_a_column_that_numbers_the_tests_is_joined_with_the_plan_by_its_key(tmp_
     assert "E_CURRENT_MISSING" in {r.error.code for r in result.refusals}
 
 
+@pytest.mark.parametrize(("between", "joined"), [(0.0, True), (1.0, False)])
+def test_rests_between_the_numbered_tests_have_no_row_in_a_plan_and_motions_without_one_are_not_joined(
+    tmp_path, between, joined
+):
+    text = "Time (s),Step,Disp (mm),Force (N)\n"
+    for number, (frequency, amperes) in enumerate(STEPS):
+        x, f = motion(frequency, amperes, number)
+        text += rows(T + 60 * number, np.full(T.size, 2 * number + 1), x, f)
+        text += rows(T + 60 * number + 30, np.full(T.size, 2 * number + 2), between * x, between * f)
+    (tmp_path / "record.csv").write_text(text)
+    plan = "Step  Current/A  Freq/Hz\n" + "".join(f"{2 * n + 1}  {i}  {f}\n" for n, (f, i) in enumerate(STEPS))
+    (tmp_path / "README.txt").write_text(f"Odd steps are tests.\n\n{plan}")
+    result = import_files([tmp_path])
+    assert currents(result.records) == ([0.0, 0.0, 0.5, 0.5] if joined else [])
+    assert ("E_CURRENT_MISSING" in {refusal.error.code for refusal in result.refusals}) is not joined
+
+
 @pytest.mark.parametrize("gap", [0.0, 9.0])
 def test_parts_of_a_record_without_the_heading_of_the_first_go_on_by_their_clock(tmp_path, gap):
     for part, inside in enumerate((slice(0, 300), slice(300, 600), slice(600, None)), 1):

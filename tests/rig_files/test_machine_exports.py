@@ -9,7 +9,8 @@ from openpyxl import Workbook
 from scipy.io import savemat
 
 from mrdamper import import_files
-from mrdamper.rig_files.profile import parse_profile
+from mrdamper.rig_files.profile import Profile, parse_profile
+from mrdamper.rig_files.profile_template import profile_template
 
 T = np.arange(1001) / 250
 X = 10 * np.sin(2 * np.pi * T + 0.3)  # [mm]
@@ -263,7 +264,13 @@ def test_a_row_of_units_may_end_with_the_start_and_the_step_of_the_samples(tmp_p
 
 
 def test_a_folder_of_an_oscilloscope_has_a_file_for_each_channel_and_notes_beside_its_rows(tmp_path):
-    notes = ["Record Length,1001,", "Source,{},", "Vertical Units,V,", "Horizontal Units,s,", "Model Number,TDS2014,"]
+    notes = [
+        "Record Length,1001,",
+        "Source,{},Second",
+        "Vertical Units,V,",
+        "Horizontal Units,s,",
+        "Model Number,TDS2014,",
+    ]
     for number, amperes in enumerate(CURRENTS):
         folder = tmp_path / f"ALL{number:04d}"
         folder.mkdir()
@@ -274,6 +281,20 @@ def test_a_folder_of_an_oscilloscope_has_a_file_for_each_channel_and_notes_besid
     listed = [f"ALL{number:04d}: {amperes} A, 1 Hz\n" for number, amperes in enumerate(CURRENTS)]
     (tmp_path / "README.txt").write_text("CH1 = LVDT, 4 mm/V\nCH2 = load cell, 100 N/V\n" + "".join(listed))
     expect(tmp_path, *CURRENTS)
+    (tmp_path / "README.txt").write_text("".join(listed))
+    for refusal in import_files([tmp_path]).refusals:  # the list of tests waits for the columns
+        assert refusal.error.code == "E_COLUMN"
+        assert "current" not in refusal.error.remedy
+    (tmp_path / "README.txt").unlink()
+    written, _ = profile_template([tmp_path], Profile())
+    asked = [f'"{number:04d}" =' for number in range(len(CURRENTS))]
+    assert written.endswith("#[current.values]\n" + "".join(f"#{line}\n" for line in asked))
+    for channel, name, unit, scale in (("displacement", "CH1", "mm", 4), ("force", "CH2", "N", 100)):
+        stated = f'file = "F{{run}}{name}.CSV"\ncolumn = "{name}"\nunit = "{unit}"\nscale = {scale}\n'
+        written = written.replace(f"[channels.{channel}]\n", f"[channels.{channel}]\n{stated}")
+    for number, current in enumerate(CURRENTS):
+        written = written.replace(f'#"{number:04d}" =', f'"ALL{number:04d}" = {current}')  # by its folder
+    expect(tmp_path, *CURRENTS, profile=written.replace("#[current.values]", "[current.values]"))
 
 
 def test_a_long_table_is_known_by_what_stands_in_its_columns(tmp_path):

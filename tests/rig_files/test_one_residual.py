@@ -17,6 +17,7 @@ from mrdamper.rig_files.quality.cycles import POINTS, damping, elastic_plastic, 
 from mrdamper.rig_files.quality.disturbance import noise_by_octave
 from mrdamper.rig_files.quality.lag import force_channel, force_lag
 from mrdamper.rig_files.quality.motion import agrees_with_its_name
+from mrdamper.rig_files.quality.samples import no_bit_is_stuck
 from mrdamper.rig_files.quality.table import check_run, record_of
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Record
@@ -154,6 +155,13 @@ def jumping(jump, at):
 def test_a_stuck_bit_skips_levels_of_the_force(size):
     kind = next(kind for kind in operator_faults.KINDS if kind.name == "bit of the force stuck")
     assert "W_COARSE" in codes_of(kind.change(sine_record(points=1000), size, np.random.default_rng(3)))
+
+
+@pytest.mark.parametrize("step", [30.0, 40.0])
+def test_a_step_of_a_coarse_converter_is_no_stuck_bit(step):
+    record = sine_record(points=1000)
+    rounded = replace(record, force=step * np.round(record.force / step))
+    assert not [*no_bit_is_stuck(View(rounded))]
 
 
 @pytest.mark.parametrize("jump", [-300, -100, -60, 60, 100, 300])

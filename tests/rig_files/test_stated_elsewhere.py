@@ -931,3 +931,74 @@ def test_no_current_is_offered_by_another_resistance_or_voltage_or_above_those_o
     (refusal,) = import_files([tmp_path]).refusals
     assert refusal.error.code == "E_CURRENT_MISSING"
     assert "ohm" not in str(refusal.error)
+
+
+def test_a_label_alone_on_its_line_states_what_the_next_holds(tmp_path):
+    """As SignalExpress exports: a step for each column, in seconds, and names of terminals that a text explains."""
+    head = ["channel names: ", "0_Voltage - Dev1_ai0\t0_Voltage - Dev1_ai1\t", "start times: "]
+    head += ["01/09/2016 15:01:22.331\t01/09/2016 15:01:22.331\t", "dt: ", "0.002\t0.002\t", "data: "]
+    body = [f"{x / 5:.6f}\t{f / 500:.6f}\t" for x, f in zip(X, force(0.5), strict=True)]
+    (tmp_path / "run1.txt").write_text("\n".join([*head, *body, ""]))
+    note = tmp_path / "README.txt"
+    note.write_text("Dev1_ai0 - stroke (LVDT), 5 mm/V\nDev1_ai1 - load cell, 500 N/V\ncoil current: 0.5 A\n")
+    (record,) = import_files([tmp_path], parse_profile("[current]\nvalue = 0.5\n")).records
+    np.testing.assert_allclose(record.time, T, atol=1e-9)
+    np.testing.assert_allclose(record.displacement, 1e-3 * X, atol=1e-6)
+    np.testing.assert_allclose(record.force, force(0.5), atol=1e-2)
+    note.write_text("Dev1 - stroke (LVDT), 5 mm/V\nDev1_ai1 - load cell, 500 N/V\n")  # not the whole name of a terminal
+    assert not import_files([tmp_path], parse_profile("[current]\nvalue = 0.5\n")).records
+
+
+@pytest.mark.parametrize(
+    ("said", "sign"),
+    [("compression gives plus (so change the sign)", -1), ("tension plus", 1), ("tension gives minus", -1),
+     ("compression plus friction", 1)],
+)  # fmt: skip
+def test_plus_and_minus_at_the_end_of_a_clause_are_signs(tmp_path, said, sign):
+    table(tmp_path / "a.csv", ["time [s],displacement [mm],force [N]"], T, X, sign * force(0.5))
+    (tmp_path / "notes.txt").write_text(f"load cell, {said}\n")
+    (record,) = import_files([tmp_path], parse_profile("[current]\nvalue = 0.5\n")).records
+    np.testing.assert_allclose(record.force, force(0.5), atol=1e-2)
+
+
+@pytest.mark.parametrize("mark", ["", "_", "-"])
+def test_a_line_for_each_test_may_name_it_with_a_mark_before_its_number(tmp_path, mark):
+    for number, amperes in enumerate((0.0, 0.5, 1.0), 1):
+        table(tmp_path / f"scope{mark}{number}.csv", ["time [s],LVDT [mm],load cell [V]"], T, X, force(amperes) / 250)
+    lines = [f"scope{mark}{number}: {amperes} A, 1 Hz\n" for number, amperes in enumerate((1.0, 0.5, 0.0), 1)]
+    (tmp_path / "notes.txt").write_text("".join(lines[::-1]))  # in another order than the files
+    result = import_files([tmp_path])
+    assert {refusal.error.code for refusal in result.refusals} == {"E_UNITS_DIMENSION"}
+    assert not any("current" in refusal.error.remedy for refusal in result.refusals)
+    assert result.reasons["notes.txt"] == "currents under 'a line for each test', used once the columns are known"
+    calibration = parse_profile('[channels.force]\nunit = "N"\nscale = 250\n')
+    assert [record.current[0] for record in import_files([tmp_path], calibration).records] == [1.0, 0.5, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("arrays", "expected"),
+    [("I = [0.0 0.5 1.0 0.0];  % coil current, A\nf = [1 1 1 2]; % Hz\n", [0.0, 0.5, 1.0, 0.0]),
+     ("I = [1.0 0.5 0.0 0.0];  % coil current, A\nf = [1 1 1 2]; % Hz\n", []),  # forces fall
+     ("I = [0.0 0.5 1.0 0.0];  % coil current, A\nf = [1 1 2 1]; % Hz\n", []),  # of other tests
+     ("I = [0.0 0.5 1.0];  % coil current, A\n", [])],
+    ids=["of the tests", "falling forces", "other frequencies", "of other tests"],
+)  # fmt: skip
+def test_arrays_and_comments_of_a_script_state_currents_in_order_and_units(tmp_path, arrays, expected):
+    for number, (amperes, frequency) in enumerate([(0.0, 1), (0.5, 1), (1.0, 1), (0.0, 2)], 1):
+        time, shift = T / frequency, 30 * number
+        savemat(tmp_path / f"run{number}.mat", {"time": time, "stroke": X, "load_cell": force(amperes) + shift})
+    comments = "% signals(1): stroke in mm (wire pot, gain in the model)\n% signals(2): load_cell in N, tension +\n"
+    (tmp_path / "plot_all.m").write_text(f"{comments}% time in s\n{arrays}for k = 1:4\n  x = signals(1);\nend\n")
+    result = import_files([tmp_path])
+    stated = [record.current[0] for record in result.records]
+    assert stated == expected, [str(refusal.error) for refusal in result.refusals]
+
+
+def test_a_plan_in_another_code_page_is_named_as_it_is_written_and_its_rows_are_counted(tmp_path):
+    for number in range(7):
+        table(tmp_path / f"2019-10-02 1{number}-00-00.csv", ["t [s],x [mm],F [N]"], T, X, force(0.3 * number))
+    rows = [f"{number};{0.3 * number:.1f};1,0" for number in range(1, 9)]
+    text = "\n".join(["Poř.;Proud [A];Frekvence [Hz]", *rows, ""])
+    (tmp_path / "plan.csv").write_bytes(text.encode("cp1250"))
+    why = import_files([tmp_path]).reasons["plan.csv"]
+    assert "8 rows for 7 tests, no column beside it names every test (Poř., Frekvence [Hz])" in why

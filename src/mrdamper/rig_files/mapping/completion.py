@@ -303,13 +303,10 @@ def _with_name_by_file(table: RawTable) -> RawTable:
 
 
 def _with_explained_names(table: RawTable) -> RawTable:
-    """Names of columns that say nothing, with what a line that begins with each says: PT07;Stroke;mm; y0 = load, N.
-
-    Of a voltage the line may begin with a part of its name alone, Dev1_ai0, and state the scale.
-    """
+    """Names of columns that say nothing, with what a line that begins with each says: PT07;Stroke;mm; y0 = load, N."""
     lines = [[cell.strip(' "') for cell in _CELLS_OF_NAME.split(line.strip(" |"))] for line in table.lines]
     parts = {cells[0] for cells in lines if len(cells) > 1 and re.search(r"[^\W\d_].*[0-9]", cells[0])}
-    parts = {part: [scales.has_name(name, part) for name in table.names] for part in parts}
+    parts = {part: [scales.has_name(name, part) for name in table.names] for part in parts}  # ai0 of Voltage - ai0
     headings = {}
     for i, (name, header) in enumerate(zip(table.names, table.headers, strict=True)):
         voltage = header.role == "voltage"

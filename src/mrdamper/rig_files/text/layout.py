@@ -74,7 +74,7 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
 
     Raises `RigFileError`, its code E_NO_DATA, E_AMBIGUOUS, E_FIELD_COUNT, E_TOO_MANY_COLUMNS or E_QUOTE.
     """
-    as_written, lines = lines, sampling.without_units(lines)
+    as_written, lines = lines, sampling.without_units(_behind_labels(lines))
     content = sampling.content_of(lines)
     separator = form.separator or sampling.separator_of(lines, content, source)
     above = form.data_line - 1 if form.data_line else form.header_line or 0
@@ -92,7 +92,7 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
     if sampling.counts(row[0] for row in rows):
         lines = [*_with_name_of_numbers(lines[:first], separator, width), *lines[first:]]
     seconds = any(_SIMULINK in line for line in lines[:first])
-    lines = [*_without_keys(_behind_labels(lines[:first], separator), separator), *lines[first:]]
+    lines = [*_without_keys(lines[:first], separator), *lines[first:]]
     header, unit_row = _header_lines(lines, first, separator, width, source, form)
     if header is not None and not is_comment(lines[header]):
         sampling.split_strictly(lines[header], separator, source, header + 1)
@@ -150,13 +150,15 @@ def _with_name_of_numbers(above: Sequence[str], separator: str, width: int) -> l
     return [f'""{separator}{line}' if i == named[0] else line for i, line in enumerate(above)]
 
 
-def _behind_labels(above: Sequence[str], separator: str) -> list[str]:
-    """Return lines above the rows, the value of all columns behind the label alone above it: dt:, 0.002, 0.002, in s."""
-    lines = list(above)
-    for i, label in enumerate(above[:-1]):
-        key, values = label.strip(), {cell for cell in cells_of(above[i + 1], separator) if cell}
-        if key.endswith(":") and separator not in key and len(values) == 1 and looks_numeric(value := values.pop()):
-            lines[i : i + 2] = f"{key} {value}{' s' * (key == 'dt:')}", ""
+def _behind_labels(lines: Sequence[str]) -> list[str]:
+    """Return lines, the value of all columns behind the label alone above it: dt:, 0.002, 0.002, as LabVIEW in s."""
+    lines = list(lines)
+    for i, (label, line, below) in enumerate(zip(lines, lines[1:], lines[2:], strict=False)):
+        if re.fullmatch(r"[^\t;|,]+:\s*", label):
+            mark = next(filter(line.__contains__, "\t;|,"), SPACES)
+            values = {cell for cell in cells_of(line, mark) if cell}
+            if len(values) == 1 and looks_numeric(*values) and not sampling.is_row(cells_of(below, mark)):
+                lines[i : i + 2] = f"{label.strip()} {values.pop()}{' s' * (label.strip() == 'dt:')}", ""
     return lines
 
 
