@@ -11,9 +11,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from mrdamper.data import session_of
 from mrdamper.data.wording import counted, number
-from mrdamper.errors import InputError, listed
+from mrdamper.errors import listed
 from mrdamper.study.contradictions.tracks import Track
 
 REPEATS_CODE = "W_REPEATS"
@@ -64,7 +63,7 @@ def _log_ratio(pair: Pair) -> float:
 
 
 def _of_group(pairs: Sequence[Pair], middle: float) -> str:
-    high, low = ({side.run.id: _session(side) for side in sides} for sides in zip(*pairs, strict=True))
+    high, low = ({side.run.id: side.session for side in sides} for sides in zip(*pairs, strict=True))
     one, other = ({*sessions.values()} for sessions in (high, low))
     if len(one) == 1 and one != other and "" not in one | other:
         names, others = f"The tests of session {one.pop()}", f"those of session {listed(sorted(other), _MAX_NAMES)}"
@@ -88,9 +87,3 @@ def _of_pair(pair: Pair) -> str:
         f"amplitude: {_CAUSES}; {_REMEDY}."
     )
 
-
-def _session(track: Track) -> str:
-    try:
-        return session_of(track.run) or ""
-    except InputError:
-        return ""

@@ -21,6 +21,7 @@ from mrdamper.study.contradictions.evidence import (
 )
 from mrdamper.study.contradictions.explanations import (
     EMPTY_CELL_ODDS,
+    _FREE_ODDS, _LEVEL_ODDS,
     MAX_IRREGULARITY,
     MAX_SESSION_GAIN,
     Cause,
@@ -74,6 +75,11 @@ class JointExplanation:
     gain: float
 
 
+_TRIED_CURRENTS = 16  # currents that are tried for several runs together
+_CURRENT_FACTORS = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8)  # factors of the stated current that several runs may share
+_MAX_SEVERAL = 0.34  # share of the runs that may have other currents
+MIN_CURRENT_CHANGE = 0.08  # change of a current over the highest one at least
+_MAX_CHANGES = 12  # changes of currents in one set
 _FALLING_ODDS, _MIN_FALL, _MAX_FALLING_ODDS = 60.0, 0.05, 8.0  # odds against a falling force: per share, from, at most
 _AT_NODE = 0.9  # share of a node from which a run is at its current
 _NO_PROPOSAL = JointExplanation({}, -np.inf)
@@ -130,6 +136,8 @@ class Search:
     def _explain_until_agreement(self, most: int) -> None:
         while len(self.found) <= most:
             best = max(self._proposals(), key=self._rank, default=_NO_PROPOSAL)
+            if best.gain > 0 and not self.found:
+                best = max(best, self._of_several(), key=self._rank)
             if not best.explanations or best.gain < self._threshold(best.explanations):
                 best = self._further()
                 best = best if best.explanations else self._of_gains(-np.inf)
@@ -276,6 +284,69 @@ class Search:
             best = max(self._of_rows(order[:_RUNS_PER_ROUND]), key=lambda proposal: proposal.gain, default=_NO_PROPOSAL)
             if best.explanations:
                 yield self._refined_rows(best, posterior)
+
+    def _of_several(self) -> JointExplanation:
+        """Return the best other currents of some runs together: each its own, or all by one factor, as of a session.
+
+        Before all of them are explained, none of them may look far better than the others.
+        """
+        currents, spread = self._levels(self._agreeing()), self.evidence.spread
+        expected, last = self.posterior(), float(self.evidence.nodes[-1])
+        tried = dict.fromkeys(np.linspace(0, last, _TRIED_CURRENTS)[1:-1].tolist(), _FREE_ODDS)
+        tried |= dict.fromkeys(self.evidence.nodes.tolist(), _LEVEL_ODDS)
+        free = [Trial("current", current, "", odds) for current, odds in tried.items()]
+        self.evidence.spread = replace(spread, gain=_GAINS[-1][0], offset=_GAINS[-1][1])
+        sets = dict(self._grown_currents(dict.fromkeys(currents, free), 0.0))
+        for factor in _CURRENT_FACTORS:
+            scaled = {k: Trial("current", factor * at, "", _MEMBER_ODDS) for k, at in currents.items() if at > 0}
+            sets |= self._grown_currents({k: [trial] for k, trial in scaled.items()}, _FREE_ODDS - _MEMBER_ODDS)
+            for session in {self.tracks[k].session for k in scaled} - {""}:
+                sets[tuple((k, t) for k, t in scaled.items() if self.tracks[k].session == session)] = _FREE_ODDS
+        self.evidence.spread = spread
+        base, best = self._adapted_gains({}, expected), _NO_PROPOSAL
+        for members, odds in sets.items():
+            apparent = {k: trial.value for k, trial in members}
+            if 2 <= len(members) <= _MAX_SEVERAL * len(self.tracks) and not unproven_currents(self.tracks, apparent):
+                changed = {k: self._candidates[k].changed(trial) for k, trial in members}
+                gain = self._adapted_gains(changed, expected) - base - odds
+                if gain > best.gain:
+                    best = JointExplanation({k: Explanation(t, gain, changed[k]) for k, t in members}, gain)
+        return best
+
+    def _grown_currents(
+        self, trials: Mapping[int, Sequence[Trial]], odds: float
+    ) -> Iterator[tuple[tuple[tuple[int, Trial], ...], float]]:
+        """Yield sets of runs with other currents and their prior odds, each with the most probable further change."""
+        chosen = dict[int, Trial]()
+        members = {k: self._members[k] for k in self._agreeing()}
+        least = MIN_CURRENT_CHANGE * float(self.evidence.nodes[-1])
+        for _ in range(_MAX_CHANGES):
+            options: list[tuple[float, int, Trial, Moments]] = []
+            for i, of in trials.items():
+                others = self.evidence.posterior([m for k, m in members.items() if k != i])
+                stated = Trial("current", float(self.tracks[i].current[0]), "", 0.0)
+                versions = [chosen.get(i, stated), *([stated] if i in chosen else [])]
+                versions += [t for t in of if abs(t.value - stated.value) > least]
+                moments = others.weigh([self._candidates[i].changed(trial) for trial in versions])
+                gains = [p - t.odds for p, t in zip(others.log_probabilities(moments), versions, strict=True)]
+                options += [(g - gains[0], i, t, m) for g, t, m in zip(gains, versions, moments, strict=True)][1:]
+            gain, i, trial, moment = max(options, key=lambda option: option[0], default=(-np.inf, 0, None, None))
+            if trial is None or moment is None or gain < (1e-6 if i in chosen else -_MEMBER_ODDS):
+                return
+            members[i], chosen[i] = moment, trial
+            if trial.odds == 0.0:
+                del chosen[i]
+            yield tuple(sorted(chosen.items(), key=lambda item: item[0])), odds + sum(t.odds for t in chosen.values())
+
+    def _adapted_gains(self, changed: Mapping[int, RowProducts], expected: Posterior) -> float:
+        """Logarithm of the evidence of all runs, some changed, at the most probable model error and scatter of gains."""
+        products, spread = [changed.get(k, self._products[k]) for k in self._agreeing()], self.evidence.spread
+        totals: list[float] = []
+        for gain, offset in {(spread.gain, spread.offset), *_GAINS[-2:]}:
+            self.evidence.spread = replace(spread, gain=gain, offset=offset)
+            totals.append(self._adapted(products, expected))
+        self.evidence.spread = spread
+        return max(totals)
 
     def _further(self) -> JointExplanation:
         """Return the run that best has the cause found in others, as a further one of their group."""

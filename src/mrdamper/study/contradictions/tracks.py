@@ -13,7 +13,7 @@ from typing import Self
 
 import numpy as np
 
-from mrdamper.data import Floats, Run, index_at
+from mrdamper.data import Floats, Run, index_at, session_of
 from mrdamper.errors import InputError
 from mrdamper.physics.motion.measured import measured_motion
 from mrdamper.physics.motion.sines import equivalent_sine
@@ -58,6 +58,14 @@ class Track:
             amplitude=self.amplitude * abs(motion),
             step=self.step * time,
         )
+
+    @property
+    def session(self) -> str:
+        """Name of the session of the test, if it is stated."""
+        try:
+            return session_of(self.run) or ""
+        except InputError:
+            return ""
 
     def is_at_motion(self, other: Track) -> bool:
         """Tell whether two runs are sines of one frequency and amplitude."""
