@@ -136,7 +136,8 @@ class Search:
     def _explain_until_agreement(self, most: int) -> None:
         while len(self.found) <= most:
             best = max(self._proposals(), key=self._rank, default=_NO_PROPOSAL)
-            if best.gain > 0 and not self.found:
+            causes = {explanation.cause for explanation in best.explanations.values()}
+            if best.gain > 0 and (causes <= {"current", "shifted", "damper"} or best.gain < self._threshold(best.explanations)):
                 best = max(best, self._of_several(), key=self._rank)
             if not best.explanations or best.gain < self._threshold(best.explanations):
                 best = self._further()
@@ -290,7 +291,8 @@ class Search:
 
         Before all of them are explained, none of them may look far better than the others.
         """
-        currents, spread = self._levels(self._agreeing()), self.evidence.spread
+        spread = self.evidence.spread
+        currents = self._levels(k for k in self._agreeing() if k not in self.found)
         expected, last = self.posterior(), float(self.evidence.nodes[-1])
         tried = dict.fromkeys(np.linspace(0, last, _TRIED_CURRENTS)[1:-1].tolist(), _FREE_ODDS)
         tried |= dict.fromkeys(self.evidence.nodes.tolist(), _LEVEL_ODDS)
