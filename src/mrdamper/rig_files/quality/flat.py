@@ -306,6 +306,17 @@ def _rest(speed: Floats, force: CycleChannel, extreme: int) -> float:
     return (before + after) / POINTS - np.arcsin(_REST) / np.pi
 
 
+def flat_ends(view: View) -> list[float]:
+    """Return the levels [N] at which the mean cycle of the force is as flat as one that is cut off, by its form alone.
+
+    A plateau of the damper is as flat.
+    """
+    if (cycles := steady_cycles(view)) is None:
+        return []
+    ends = ends_of(cycles.force, len(cycles.starts), view.force_noise)
+    return [top.level for top in ends if top.wider < _FORCE_WIDER and _WIDTH[0] < top.width < _WIDTH[1]]
+
+
 def _finding(name: str, span: float, tops: list[Top]) -> Iterator[Finding]:
     tops = [top for top in tops if _WIDTH[0] < top.width < _WIDTH[1] and top.beyond > 0.5 * NOTED * span]
     if tops:

@@ -25,6 +25,7 @@ _ELASTIC = 0.9  # correlation with the displacement from which a force is nearly
 _GAIN, _EVEN = 0.3, 0.08  # natural logarithms: a leap of the force's size, and what it varies by before and after
 _SAME_CURRENT = 0.1  # [A]
 _FEWEST = 20  # samples of a cycle
+_FEWEST_STROKES, _MOST_STROKES, _SAME_STROKE = 10, 0.6, 0.02  # strokes; share that are alike, to this tolerance
 _LONG = 0.08  # of a cycle: a stretch of the other sign that no timing makes
 POOR_REPEATABILITY = 0.03  # of the peak-to-peak force; good rigs have 0.2 to 1.7 %
 _NOISE = 0.7  # of a channel's standard deviation: white noise has 1, a noisy load cell 0.1
@@ -102,8 +103,12 @@ def _is_folded(view: View, force: Floats, out: float, back: float) -> bool:
 def keeps_its_sign(view: View) -> None:
     """Refuse a force that changes its sign within the record: cycle against cycle, or stretches of one."""
     cycles = every_cycle(view)
-    if cycles is None or len(cycles.starts) < 2 or cycles.period < _FEWEST * view.step or view.noticed("W_FROZEN"):
+    if view.noticed("W_FROZEN"):
         return  # a force that stands still opposes its own other half cycle
+    if cycles is None:
+        _keeps_its_scale_in_strokes(view)
+    if cycles is None or len(cycles.starts) < 2 or cycles.period < _FEWEST * view.step:
+        return
     starts, force = cycles.starts, cycles.force.values
     ends = np.searchsorted(view.run.time, [starts, starts + cycles.period])
     shares = np.array([_damping_share(view, start, stop) for start, stop in ends.T])
@@ -112,7 +117,8 @@ def keeps_its_sign(view: View) -> None:
         raise _flip(view, float(starts[flipped[0]]), flipped.size, len(starts))
     if len(starts) < 3:
         return
-    _keeps_its_scale(view, starts, force)
+    sizes = np.log(np.mean(np.abs(force - np.mean(force, axis=1, keepdims=True)), axis=1))
+    _keeps_its_scale(view, starts, sizes)
     usual = np.median(force, axis=0)
     counts = np.abs(usual) > 0.3 * np.max(np.abs(usual))
     against = counts & (np.abs(force + usual) < 0.3 * np.abs(force - usual))
@@ -122,12 +128,20 @@ def keeps_its_sign(view: View) -> None:
             raise _flip(view, start + begin * cycles.period / POINTS, 1, len(starts))
 
 
-def _keeps_its_scale(view: View, starts: Floats, folded: Floats) -> None:
-    """Refuse a force that from some cycle on is the same times another number."""
-    if view.record.current is not None and np.ptp(view.run.current) > _SAME_CURRENT:
-        return
-    sizes = np.log(np.mean(np.abs(folded - np.mean(folded, axis=1, keepdims=True)), axis=1))
-    if np.ptp(sizes) <= _GAIN:
+def _keeps_its_scale_in_strokes(view: View) -> None:
+    """Refuse a motion without a period if, in its strokes of one length and duration, the force changes its scale."""
+    strokes, force = view.strokes, view.run.force
+    of_motion = np.array([strokes.lengths, strokes.durations])
+    if strokes.lengths.size >= _FEWEST_STROKES:
+        alike = np.all(np.abs(of_motion.T / np.median(of_motion, axis=1) - 1) < _SAME_STROKE, axis=1)
+        if np.mean(alike) > _MOST_STROKES:
+            high, low = (extreme.reduceat(force, strokes.reversals)[:-1] for extreme in (np.maximum, np.minimum))
+            _keeps_its_scale(view, view.run.time[strokes.reversals[:-1][alike]], np.log((high - low)[alike]))
+
+
+def _keeps_its_scale(view: View, starts: Floats, sizes: Floats) -> None:
+    """Refuse a force whose size (logarithm), cycle by cycle or stroke by stroke, changes at some time and stays so."""
+    if np.ptp(sizes) <= _GAIN or (view.record.current is not None and np.ptp(view.run.current) > _SAME_CURRENT):
         return
     for within in (0, 1):  # between two cycles, or within one
         for at in range(2, len(starts) - within):
@@ -136,7 +150,7 @@ def _keeps_its_scale(view: View, starts: Floats, folded: Floats) -> None:
             if max(np.ptp(old), np.ptp(new)) < _EVEN and abs(leap) > _GAIN:
                 problem = (
                     f"the force is {number(np.exp(leap), 3)} times as large from about {number(starts[at])} s on: a "
-                    "range, a unit or the current was changed over"
+                    "range, a unit or the current was changed over, or the record holds two tests"
                 )
                 raise view.refused("E_UNRELATED", problem, "cut the record there, or name the channel of the current")
 

@@ -24,7 +24,11 @@ CODES = {
     "damper": "E_OTHER_DAMPER",
     "shifted": "E_SHIFTED_ROWS",
     "copy": "E_TWICE",
+    "clipped": "W_CLIPPED",
+    "lag": "W_LAG",
+    "filter": "W_FILTERED",
 }
+_LAGS = {"W_FILTERED": "filter", "W_LAG": "lag"}  # causes by findings on a record that change the form of its loop
 _DECADE = 0.02  # decimal logarithm within which a ratio is a power of ten
 _MAX_POWER = 20  # of ten, up to which odds are told
 
@@ -34,7 +38,7 @@ class Contradiction:
     """A run that contradicts the others of its rig."""
 
     run_id: str
-    cause: str  # "force", "offset", "current", "displacement", "time", "sign", "damper", "shifted" or "copy"
+    cause: str  # one of `CODES`
     # factor that corrects force, displacement or time; force to add [N]; apparent current [A]; correlation of the noise
     # of a copy
     value: float
@@ -57,11 +61,14 @@ def describe(run: Run, explanation: Explanation, others: int) -> Contradiction:
         "force": _force, "offset": _offset, "current": _current, "displacement": _displacement, "time": _time,
         "sign": _sign, "damper": _damper, "shifted": _shifted,
     }[explanation.cause]  # fmt: skip
+    cause: str = explanation.cause
+    if cause == "damper" and (code := next((code for code in _LAGS if code in run.findings), None)):
+        cause, text = _LAGS[code], _lag
     contradiction, remedy = text(run, explanation.trial)
     power = explanation.gain / np.log(10)
     odds = f"10^{power:.0f}" if power < _MAX_POWER else f"over 10^{_MAX_POWER}"
     against = f"contradicts the other {counted(others, 'run')}: {contradiction} (odds of {odds} to 1)"
-    return Contradiction(run.id, explanation.cause, explanation.trial.value, explanation.gain, against, remedy)
+    return Contradiction(run.id, cause, explanation.trial.value, explanation.gain, against, remedy)
 
 
 def describe_copy(copy: Copy, validation: bool) -> Contradiction:
@@ -69,6 +76,12 @@ def describe_copy(copy: Copy, validation: bool) -> Contradiction:
     text = f"a copy of run {copy.original}: their forces share the noise (correlation {copy.correlation:.2f})"
     remedy = "a test counts once" + (", and validation needs tests of its own" if validation else "")
     return Contradiction(copy.run_id, "copy", copy.correlation, float("inf"), text, f"{remedy}: delete the file")
+
+
+def describe_clipped(run: Run, level: float, others: int) -> Contradiction:
+    """Describe a run whose force ends at a level [N] at which other runs are cut off."""
+    text = f"its force is flat at {number(level, 3)} N, where that of {counted(others, 'other run')} is cut off"
+    return Contradiction(run.id, "clipped", level, float("inf"), text, "record it again with a wider range")
 
 
 def _force(run: Run, e: Trial) -> tuple[str, str]:
@@ -129,6 +142,15 @@ def _sign(run: Run, e: Trial) -> tuple[str, str]:
 
 def _damper(run: Run, e: Trial) -> tuple[str, str]:
     return "no factor, offset or current explains its force: another damper, or another state of it", _specimen(run)
+
+
+def _lag(run: Run, e: Trial) -> tuple[str, str]:
+    codes = " and ".join(code for code in _LAGS if code in run.findings)
+    return (
+        f"its force lags or is filtered, as the check of its record shows ({codes}), and no factor, offset or current "
+        "explains it",
+        "repeat the test with both channels filtered alike and without play in the mounting",
+    )
 
 
 def _shifted(run: Run, e: Trial) -> tuple[str, str]:
@@ -192,8 +214,11 @@ def _repeated(run: Run, current: float) -> str:
     """State how another current is corrected, the measured one by a decade or an offset, or that the test is wrong."""
     if _is_stated(run):
         return f"{_stated_current(run, current)}, or repeat the test"
-    decades = np.log10(max(current, 1e-9) / max(abs(run.mean_current), 1e-9))
+    factor = max(current, 1e-9) / max(abs(run.mean_current), 1e-9)
+    decades = np.log10(factor)
     remedy = _shifted_by(run, "current", np.copysign(current, run.mean_current) - run.mean_current)
+    if min(current, abs(run.mean_current)) > SAME_CURRENT:
+        remedy += f" (or with scale = {_scale_read(run, 'current') * factor:.3g}: one current does not show which)"
     if round(decades) != 0 and abs(decades - round(decades)) < _DECADE:
         remedy = _corrected(run, "current", 10.0 ** round(decades))
     return f"correct a current that the file name states, and {remedy}, or repeat the test"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import NoReturn
@@ -12,12 +12,15 @@ import numpy as np
 from mrdamper.data import Run
 from mrdamper.data.wording import span
 from mrdamper.errors import InputError, listed
+from mrdamper.rig_files.quality.flat import flat_ends
+from mrdamper.rig_files.quality.table import record_of, with_findings
+from mrdamper.rig_files.quality.view import View
 from mrdamper.statistics.linear import on_one_blas_thread
 from mrdamper.study.contradictions.copies import find_copies
-from mrdamper.study.contradictions.findings import Contradiction, corrected_unit, describe, describe_copy
+from mrdamper.study.contradictions.findings import Contradiction, corrected_unit, describe, describe_clipped, describe_copy
 from mrdamper.study.contradictions.repeats import unequal_repeats
 from mrdamper.study.contradictions.search import Search
-from mrdamper.study.contradictions.tracks import Track, tracks_of
+from mrdamper.study.contradictions.tracks import SAME_CURRENT, Track, tracks_of
 
 MIN_RUNS = 4  # identification runs from which one can contradict the others
 _MAX_SHARE = 0.34  # share of the runs that may contradict the others; beyond, the correct ones cannot be identified
@@ -26,6 +29,8 @@ _MAX_MISFIT_FACTOR = 4.0  # factor of the usual model error at which runs do not
 _INVERSE_TOLERANCE = 0.1  # logarithm of the product of two factors up to which one is the inverse of the other
 _MIN_GAIN = 1e-3  # gain of a run at least, for its logarithm
 _CLUSTERS_REMEDY = "tests of two dampers need two names in the column rig of runs.csv; --keep RUN keeps a run as it is"
+_MIN_CLIPPED = 2  # runs cut off at a level that show the end of a range there
+_SAME_LEVEL = 0.02  # relative difference of two levels that are one
 _MAX_MOTIONS = 4  # motions named in one sentence
 _MILLIAMPERE_RATIO = 50.0  # ratio of a current to the usual one from which it is in milliamperes
 
@@ -58,7 +63,10 @@ def compare_runs(runs: Sequence[Run], keep: Collection[str] = ()) -> RunComparis
     validated = {run.id for run in runs if run.split == "validate"}
     described = [describe_copy(copy, copy.run_id in validated) for copy in copies]
     contradictions = {one.run_id: one for one in described if one.run_id not in keep}
-    tracks, milliamperes = _in_amperes(tracks_of([run for run in runs if run.id not in contradictions]), keep)
+    clipped = [run for run in runs if run.split == "train" and "W_CLIPPED" in with_findings(run).findings]
+    contradictions |= {one.run_id: one for one in _clipped_alike(runs, clipped) if one.run_id not in keep}
+    aside = {*contradictions, *(run.id for run in clipped)} - {*keep}
+    tracks, milliamperes = _in_amperes(tracks_of([run for run in runs if run.id not in aside]), keep)
     contradictions |= milliamperes
     train, undescribed = [track for track in tracks if track.run.split == "train"], ""
     if len(train) >= MIN_RUNS:
@@ -80,6 +88,20 @@ def compare_runs(runs: Sequence[Run], keep: Collection[str] = ()) -> RunComparis
     return RunComparison([contradictions[run.id] for run in runs if run.id in contradictions], notes)
 
 
+def _clipped_alike(runs: Sequence[Run], clipped: Sequence[Run]) -> Iterator[Contradiction]:
+    """Find runs whose force is flat where that of several clipped runs is cut off, and larger at no test of a current."""
+    ends = {run.id: flat_ends(View(record_of(run))) for run in runs} if len(clipped) >= _MIN_CLIPPED else {}
+    levels = [level for run in clipped for level in ends.get(run.id, [])]
+    for run in runs if levels else ():
+        at_current = [one for one in runs if abs(one.mean_current - run.mean_current) <= SAME_CURRENT]
+        for level in ends[run.id] if run not in clipped else ():
+            alike = sum(abs(other - level) < _SAME_LEVEL * abs(level) for other in levels)
+            beyond = max(float(np.max(one.force * np.sign(level))) for one in at_current) / abs(level) - 1
+            if alike >= _MIN_CLIPPED and beyond < _SAME_LEVEL:
+                yield describe_clipped(run, level, alike)
+                break
+
+
 def _among(train: Sequence[Track], keep: Collection[str]) -> tuple[dict[str, Contradiction], str]:
     """Contradictions among identification runs, and a sentence on the motions that their comparison fails at."""
     search = Search(train)
@@ -91,7 +113,7 @@ def _among(train: Sequence[Track], keep: Collection[str]) -> tuple[dict[str, Con
     groups = _parted(train, search.differing)
     if groups and not any(set(keep) >= set(group) for group in groups):
         return _without_few(train, min(groups, key=len), keep) or _refuse_differing(train, groups)
-    causes = {one.cause for one in contradictions.values()}
+    causes = {e.cause for i, e in search.found.items() if train[i].run.id in contradictions}
     incoherent = len(contradictions) > _REFUSED_SHARE * len(train) and (
         search.evidence.spread.misfit >= _MAX_MISFIT_FACTOR or ("damper" in causes and len(causes) > 1)
     )
