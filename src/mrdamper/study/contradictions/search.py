@@ -64,6 +64,7 @@ _REFINED_EXPLANATIONS = 4  # single explanations whose model error is adapted
 _GROUP_GAIN_DIFFERENCE = 0.3  # difference of the logarithms of the gains of two groups of runs at one current
 _MIN_BESIDE = 3  # other runs at a motion or a current that show how well the model describes it
 _MAX_BESIDE = 3.0  # factor of the usual model error there at most; beyond, runs there do not agree
+_PAIR = 2  # runs with faults of their own that look like those of another damper
 _ROUNDS = 4  # assignments of runs to two groups
 
 
@@ -146,7 +147,7 @@ class Search:
                 self._of_gains(best.gain)
             if not best.explanations or self.differing:
                 break
-            self._accept(best.explanations)
+            self._accept(self._by_themselves(best.explanations))
 
     def posterior(self, but: Iterable[int] = ()) -> Posterior:
         """Coefficients determined by the runs as corrected, without some of them."""
@@ -379,6 +380,15 @@ class Search:
             alone = {left[k]: Explanation(trial, odds, self._products[left[k]]) for k in differences.members}
             return JointExplanation(alone, odds)
         return _NO_PROPOSAL
+
+    def _by_themselves(self, group: dict[int, Explanation]) -> dict[int, Explanation]:
+        """Return explanations of two causes instead of another damper of two runs, where each is as probable."""
+        if len(group) != _PAIR or any(e.cause != "damper" for e in group.values()):
+            return group
+        others = self.posterior(group)
+        named = {k: e for k in group for e in self._candidates[k].explanations(others)[:1]}
+        probable = all(self._candidates[k].alone(others).gain - e.gain < _TIE_ODDS for k, e in named.items())
+        return named if probable and len({e.cause for e in named.values()}) == _PAIR else group
 
     def _of_one(self, i: int) -> JointExplanation:
         others = self.posterior([i])
