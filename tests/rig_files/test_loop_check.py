@@ -9,6 +9,7 @@ import pytest
 
 from mrdamper.errors import QualityError
 from mrdamper.rig_files.quality import loop
+from mrdamper.rig_files.quality.cycles import every_cycle
 from mrdamper.rig_files.quality.loop import damping_share, dissipates, keeps_its_sign, repeatability, repeats
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Record
@@ -235,6 +236,22 @@ def test_a_folded_force_is_near_zero_on_both_sides_of_the_middle(centre, side):
     force = folded()(phase, 0, 0)
     assert loop._is_folded(seen, force, 1.0, 0.95)
     assert not loop._is_folded(seen, np.where(np.sin(phase) > 0, 1.0, force), 1.0, 0.95)
+
+
+@pytest.mark.parametrize(("ratio", "length", "refuses"), [(0.6, 1.0, True), (0.8, 1.0, False), (0.6, 0.9, False)])
+def test_a_motion_without_a_period_whose_force_changes_in_strokes_of_one_length_is_refused(ratio, length, refuses):
+    """Two tests of one motion in one file, 0.37 s apart, the second with a part of the force or of the stroke."""
+    time = np.arange(0, 10.37, 0.004)
+    phase = 2 * np.pi * np.select([time < 5, time < 5.37], [time, 5.0], time - 0.37)
+    second = time > 5.2
+    force = np.where(second, ratio, 1.0) * 700 * np.tanh(4 * np.cos(phase))
+    whole = View(Record("two", time, 0.01 * np.where(second, length, 1.0) * np.sin(phase), force))
+    assert every_cycle(whole) is None
+    if not refuses:
+        return keeps_its_sign(whole)
+    with pytest.raises(QualityError, match="or the record holds two tests") as refused:
+        keeps_its_sign(whole)
+    assert refused.value.code == "E_UNRELATED"
 
 
 @pytest.mark.parametrize(

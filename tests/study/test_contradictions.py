@@ -188,6 +188,37 @@ def test_a_run_of_another_unit_does_not_hide_another_with_a_wrong_current(sound)
     }
 
 
+@pytest.mark.parametrize("stated", [{3: 0.0, 9: 0.5}, {4: 1.0, 6: 1.5}])
+def test_wrong_currents_of_several_runs_are_found_together(sound, stated):
+    runs = [replace(run, current=0 * run.current + stated.get(k, run.mean_current)) for k, run in enumerate(sound)]
+    found = {one.run_id: one.value for one in find_contradictions(runs)}
+    assert found == pytest.approx({sound[k].id: sound[k].mean_current for k in stated}, abs=0.01)
+
+
+def test_a_session_with_a_part_of_the_current_is_found_where_others_are_at_its_currents(sound):
+    sessions = [replace(run, notes={"session": "ABC"[k % 3]}) for k, run in enumerate(sound)]
+    runs = [replace(run, current=run.current / 0.7) if k % 3 == 1 else run for k, run in enumerate(sessions)]
+    assert {one.run_id: one.cause for one in find_contradictions(runs)} == {"t04": "current", "t07": "current"}
+
+
+def test_clipped_runs_get_no_other_current_and_show_the_range_that_cuts_off_others(sound):
+    """Those flat at a level at which two others are cut off are excluded, though their own loop could be a damper's."""
+    limit = 0.6 * max(float(np.max(np.abs(run.force))) for run in sound[9:])
+    cut = [replace(run, force=np.clip(run.force, -limit, limit)) for run in sound[9:]]
+    knee = limit / (limit**12 + np.abs(sound[11].force) ** 12) ** (1 / 12)
+    runs = [*sound[:9], *cut[:2], replace(sound[11], force=sound[11].force * knee)]
+    assert {one.run_id: one.code for one in find_contradictions(runs)} == {"t11": "W_CLIPPED"}
+    assert find_contradictions([*sound[:9], cut[0], *sound[10:]]) == []
+
+
+@pytest.mark.parametrize("code", ["W_LAG", "W_FILTERED"])
+def test_a_lag_that_the_check_of_the_record_states_is_the_cause_instead_of_another_damper(sound, code):
+    explanation = Explanation(Trial("damper", 1.0, "", 10.0), 50.0, None)
+    one = describe(replace(sound[4], notes={"findings": code}), explanation, 11)
+    assert one.code == code
+    assert "rig of runs.csv" not in one.remedy
+
+
 @pytest.mark.parametrize(
     ("channel", "factor", "remedy"),
     [
@@ -196,6 +227,7 @@ def test_a_run_of_another_unit_does_not_hide_another_with_a_wrong_current(sound)
         pytest.param("time", 5.0, 'unit = "s" and scale = 0.2', marks=pytest.mark.slow),
         pytest.param("rate", 0.2, "[file] sample_rate_Hz = ", marks=pytest.mark.slow),
         ("current", 0.5, 'unit = "mA" and scale = 1 and offset = 500'),
+        ("current", 0.5, "or with scale = 2: one current does not show which"),
         ("current", 0.1, 'unit = "mA" and scale = 10'),
     ],
 )

@@ -25,7 +25,7 @@ _SAME_FACTOR = 0.03  # difference of the logarithms of factors that are one
 _TRIED_CURRENTS = 31  # currents that are tried
 
 # Logarithms of prior odds against an explanation: one that names a unit, a tested level or a tested motion is simpler.
-_UNIT_ODDS, _LEVEL_ODDS, _FREE_ODDS, _SIGN_ODDS, _ODD_MOTION_ODDS, _ALONE_ODDS = 4.0, 4.0, 7.0, 4.0, 16.0, 10.0
+_UNIT_ODDS, LEVEL_ODDS, FREE_ODDS, _SIGN_ODDS, _ODD_MOTION_ODDS, _ALONE_ODDS = 4.0, 4.0, 7.0, 4.0, 16.0, 10.0
 _TESTED_MOTION_ODDS = 5.0  # decrease for a motion of other runs, and increase for losing such a motion
 _LOST_MOTION_ODDS = 30.0  # increase, without a unit, for a motion that no other run has instead of one that they have
 EMPTY_CELL_ODDS = 6.0  # decrease for a filled empty cell of the matrix of tests, down to its inverse
@@ -169,12 +169,12 @@ class ExplanationCandidate:
         expected, one = others.at(self.own.over)[0], self.own.constant
         mean = float(one @ self.own.gram @ expected) / self.own.rows
         measured = float(one @ self.own.moment) / self.own.rows
-        yield Trial("offset", self.evidence.force * (mean - measured), "", _FREE_ODDS)
+        yield Trial("offset", self.evidence.force * (mean - measured), "", FREE_ODDS)
         swing = expected - mean * one
         along = float(swing @ self.own.moment) - measured * float(swing @ self.own.gram @ one)
         if along > 0:
             best = float(swing @ self.own.gram @ swing) / along
-            yield Trial("force", best, "", _FREE_ODDS)
+            yield Trial("force", best, "", FREE_ODDS)
             for unit, factor in _both_ways(FORCE_UNITS):
                 if abs(math.log(best / factor)) < 3 * _UNIT_TOLERANCE:
                     yield Trial("force", factor, unit, _UNIT_ODDS)
@@ -189,7 +189,7 @@ class ExplanationCandidate:
         power = np.maximum(np.sum(change @ self.own.gram * change, axis=1), 0.0)
         large = np.sqrt(power / self.own.rows) > MIN_CURRENT_EFFECT * self.own.size
         for k in np.flatnonzero(large).tolist():
-            yield Trial("current", (*levels, *tried)[k], "", _LEVEL_ODDS if k < len(levels) else _FREE_ODDS)
+            yield Trial("current", (*levels, *tried)[k], "", LEVEL_ODDS if k < len(levels) else FREE_ODDS)
 
     def _of_the_motion(self) -> Iterator[tuple[Trial, Track]]:
         """Yield a factor of displacement or time, with the run as corrected; both channels inverted."""

@@ -86,4 +86,3 @@ def _of_pair(pair: Pair) -> str:
         f"Run {high.run.id} has {ratio} times the force of run {low.run.id} at the same current, frequency and "
         f"amplitude: {_CAUSES}; {_REMEDY}."
     )
-

@@ -17,7 +17,13 @@ from mrdamper.rig_files.quality.table import record_of, with_findings
 from mrdamper.rig_files.quality.view import View
 from mrdamper.statistics.linear import on_one_blas_thread
 from mrdamper.study.contradictions.copies import find_copies
-from mrdamper.study.contradictions.findings import Contradiction, corrected_unit, describe, describe_clipped, describe_copy
+from mrdamper.study.contradictions.findings import (
+    Contradiction,
+    corrected_unit,
+    describe,
+    describe_clipped,
+    describe_copy,
+)
 from mrdamper.study.contradictions.repeats import unequal_repeats
 from mrdamper.study.contradictions.search import Search
 from mrdamper.study.contradictions.tracks import SAME_CURRENT, Track, tracks_of
@@ -89,7 +95,7 @@ def compare_runs(runs: Sequence[Run], keep: Collection[str] = ()) -> RunComparis
 
 
 def _clipped_alike(runs: Sequence[Run], clipped: Sequence[Run]) -> Iterator[Contradiction]:
-    """Find runs whose force is flat where that of several clipped runs is cut off, and larger at no test of a current."""
+    """Find runs whose force is flat at the level at which several runs are cut off, the largest at a current."""
     ends = {run.id: flat_ends(View(record_of(run))) for run in runs} if len(clipped) >= _MIN_CLIPPED else {}
     levels = [level for run in clipped for level in ends.get(run.id, [])]
     for run in runs if levels else ():

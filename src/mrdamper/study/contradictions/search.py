@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from itertools import combinations, product
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,8 @@ from mrdamper.study.contradictions.evidence import (
 )
 from mrdamper.study.contradictions.explanations import (
     EMPTY_CELL_ODDS,
-    _FREE_ODDS, _LEVEL_ODDS,
+    FREE_ODDS,
+    LEVEL_ODDS,
     MAX_IRREGULARITY,
     MAX_SESSION_GAIN,
     Cause,
@@ -47,8 +48,6 @@ _SHARED_EXPLANATIONS = 3  # explanations of a run that others may have in common
 _RUNS_PER_ROUND = 16  # runs whose explanations are tried in a round, at least
 _KEEP_ODDS = 3.0  # logarithm of the odds from which an accepted explanation stays
 _SHIFT_ODDS = 9.0  # logarithm of the prior odds against shifted rows
-_EXCHANGE_ODDS = 6.0  # the same against two exchanged rows
-_SPARSE_ODDS = 20.0  # the same where the tests are no matrix of currents and motions
 _MIN_SHIFT_ODDS = -EMPTY_CELL_ODDS  # prior odds of shifted rows at least, where these complete the matrix of tests
 _MEMBER_ODDS = 4.0  # the same against a further run with the same cause
 _MAJORITY_ODDS = 6.0  # the same against another current of most runs at a current
@@ -64,6 +63,11 @@ _REFINED_EXPLANATIONS = 4  # single explanations whose model error is adapted
 _GROUP_GAIN_DIFFERENCE = 0.3  # difference of the logarithms of the gains of two groups of runs at one current
 _MIN_BESIDE = 3  # other runs at a motion or a current that show how well the model describes it
 _MAX_BESIDE = 3.0  # factor of the usual model error there at most; beyond, runs there do not agree
+_FEW_CURRENTS = 16  # currents that are tried for several runs together
+_CURRENT_FACTORS = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8)  # factors of the stated current that several runs may share
+_MAX_SEVERAL = 0.34  # share of the runs that may have other currents
+_MIN_CHANGE = 0.08  # change of a current over the highest one at least
+_MAX_CHANGES = 12  # changes of currents in one set
 _PAIR = 2  # runs with faults of their own that look like those of another damper
 _ROUNDS = 4  # assignments of runs to two groups
 
@@ -76,11 +80,6 @@ class JointExplanation:
     gain: float
 
 
-_TRIED_CURRENTS = 16  # currents that are tried for several runs together
-_CURRENT_FACTORS = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8)  # factors of the stated current that several runs may share
-_MAX_SEVERAL = 0.34  # share of the runs that may have other currents
-MIN_CURRENT_CHANGE = 0.08  # change of a current over the highest one at least
-_MAX_CHANGES = 12  # changes of currents in one set
 _FALLING_ODDS, _MIN_FALL, _MAX_FALLING_ODDS = 60.0, 0.05, 8.0  # odds against a falling force: per share, from, at most
 _AT_NODE = 0.9  # share of a node from which a run is at its current
 _NO_PROPOSAL = JointExplanation({}, -np.inf)
@@ -137,8 +136,8 @@ class Search:
     def _explain_until_agreement(self, most: int) -> None:
         while len(self.found) <= most:
             best = max(self._proposals(), key=self._rank, default=_NO_PROPOSAL)
-            causes = {explanation.cause for explanation in best.explanations.values()}
-            if best.gain > 0 and (causes <= {"current", "shifted", "damper"} or best.gain < self._threshold(best.explanations)):
+            is_of_current = {e.cause for e in best.explanations.values()} <= {"current", "shifted", "damper"}
+            if best.gain > 0 and (is_of_current or best.gain < self._threshold(best.explanations)):
                 best = max(best, self._of_several(), key=self._rank)
             if not best.explanations or best.gain < self._threshold(best.explanations):
                 best = self._further()
@@ -283,7 +282,7 @@ class Search:
         ranked = sorted(map(self._of_group, groups), key=lambda proposal: -proposal.gain)
         yield from (self._smaller(proposal) for proposal in ranked[:_REFINED_EXPLANATIONS])
         if not self.found:
-            best = max(self._of_rows(order[:_RUNS_PER_ROUND]), key=lambda proposal: proposal.gain, default=_NO_PROPOSAL)
+            best = max(self._of_rows(), key=lambda proposal: proposal.gain, default=_NO_PROPOSAL)
             if best.explanations:
                 yield self._refined_rows(best, posterior)
 
@@ -295,16 +294,17 @@ class Search:
         spread = self.evidence.spread
         currents = self._levels(k for k in self._agreeing() if k not in self.found)
         expected, last = self.posterior(), float(self.evidence.nodes[-1])
-        tried = dict.fromkeys(np.linspace(0, last, _TRIED_CURRENTS)[1:-1].tolist(), _FREE_ODDS)
-        tried |= dict.fromkeys(self.evidence.nodes.tolist(), _LEVEL_ODDS)
+        tried = dict.fromkeys(np.linspace(0, last, _FEW_CURRENTS)[1:-1].tolist(), FREE_ODDS)
+        tried |= dict.fromkeys(self.evidence.nodes.tolist(), LEVEL_ODDS)
         free = [Trial("current", current, "", odds) for current, odds in tried.items()]
         self.evidence.spread = replace(spread, gain=_GAINS[-1][0], offset=_GAINS[-1][1])
-        sets = dict(self._grown_currents(dict.fromkeys(currents, free), 0.0))
+        sets = dict(self._grown_currents({k: free for k in currents if k in self._options}, 0.0))
         for factor in _CURRENT_FACTORS:
             scaled = {k: Trial("current", factor * at, "", _MEMBER_ODDS) for k, at in currents.items() if at > 0}
-            sets |= self._grown_currents({k: [trial] for k, trial in scaled.items()}, _FREE_ODDS - _MEMBER_ODDS)
-            for session in {self.tracks[k].session for k in scaled} - {""}:
-                sets[tuple((k, t) for k, t in scaled.items() if self.tracks[k].session == session)] = _FREE_ODDS
+            suspects = {k: [trial] for k, trial in scaled.items() if k in self._options}
+            sets |= self._grown_currents(suspects, FREE_ODDS - _MEMBER_ODDS)
+            for session in sorted({self.tracks[k].session for k in scaled} - {""}):
+                sets[tuple((k, t) for k, t in scaled.items() if self.tracks[k].session == session)] = FREE_ODDS
         self.evidence.spread = spread
         base, best = self._adapted_gains({}, expected), _NO_PROPOSAL
         for members, odds in sets.items():
@@ -322,7 +322,7 @@ class Search:
         """Yield sets of runs with other currents and their prior odds, each with the most probable further change."""
         chosen = dict[int, Trial]()
         members = {k: self._members[k] for k in self._agreeing()}
-        least = MIN_CURRENT_CHANGE * float(self.evidence.nodes[-1])
+        least = _MIN_CHANGE * float(self.evidence.nodes[-1])
         for _ in range(_MAX_CHANGES):
             options: list[tuple[float, int, Trial, Moments]] = []
             for i, of in trials.items():
@@ -342,7 +342,7 @@ class Search:
             yield tuple(sorted(chosen.items(), key=lambda item: item[0])), odds + sum(t.odds for t in chosen.values())
 
     def _adapted_gains(self, changed: Mapping[int, RowProducts], expected: Posterior) -> float:
-        """Logarithm of the evidence of all runs, some changed, at the most probable model error and scatter of gains."""
+        """Logarithm of the evidence of all runs, some changed, at the most probable model error and gains."""
         products, spread = [changed.get(k, self._products[k]) for k in self._agreeing()], self.evidence.spread
         totals: list[float] = []
         for gain, offset in {(spread.gain, spread.offset), *_GAINS[-2:]}:
@@ -577,17 +577,13 @@ class Search:
             proposal = best
         return proposal
 
-    def _of_rows(self, suspects: Sequence[int]) -> Iterator[JointExplanation]:
-        """Currents of other rows of the table of tests: two rows exchanged, or all shifted by one from some row on."""
+    def _of_rows(self) -> Iterator[JointExplanation]:
+        """Currents of other rows of the table of tests, all shifted by one from some row on."""
         order = [k for k, track in enumerate(self.tracks) if not track.current_changes]
         written = [float(self.tracks[k].current[0]) for k in order]
         rows, last = list(range(len(order))), len(order) - 1
         rigid = [self.tracks[k] for k in order]
         empty = irregularity(rigid, written)
-        for i, j in combinations(rows, 2):
-            if (order[i] in suspects or order[j] in suspects) and abs(written[i] - written[j]) > SAME_CURRENT:
-                odds = _EXCHANGE_ODDS if empty <= MAX_IRREGULARITY * len(rows) else _SPARSE_ODDS
-                yield self._of_currents({order[i]: written[j], order[j]: written[i]}, "current", odds)
         for step in (-1, 1):
             for first in range(last):
                 moved = [written[k if k < first else min(max(k + step, first), last)] for k in rows]
