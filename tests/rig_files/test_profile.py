@@ -1,5 +1,7 @@
 """The rig profile: checked, written and read back, and what it changes in a record."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -311,3 +313,22 @@ def test_a_profile_is_written_for_tests_of_several_files(name, pattern, tmp_path
     assert len(records) == 2
     for number, record in enumerate(records, 1):
         np.testing.assert_allclose(record.force, rows(seed=number)[:, 2], atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "path", "matches"),
+    [
+        ("F0*", "/in/ALL0000/F0000CH1.CSV", True), ("all0000", "/in/ALL0000/F0000CH1.CSV", True),
+        ("ALL*", "/in/ALL0000/F0000CH1.CSV", False), ("in", "/in/ALL0000/F0000CH1.CSV", False),
+        ("ALL0000/F0000CH1.CSV", "/in/ALL0000/F0000CH1.CSV", True), ("*/ALL0000/*", "/in/ALL0000/F0000CH1.CSV", True),
+        ("L0000/*", "/in/ALL0000/F0000CH1.CSV", False), ("a/b.csv", "a/b.csv", True),
+    ],
+)  # fmt: skip
+def test_a_pattern_of_currents_names_a_file_with_folders_or_a_folder_as_a_whole(pattern, path, matches):
+    source = CurrentSource(values={pattern: 0.5})
+    assert source.fitting(Path(path), Path(path).stem) == [pattern] * matches
+
+
+def test_a_folder_called_as_one_of_its_files_has_no_current_of_those_with_their_own():
+    source = CurrentSource(values={"test1": 0.5, "test2": 1.0})
+    assert [source.fitting(Path(f"/in/test1/test{n}.csv"), f"test{n}") for n in (1, 2)] == [["test1"], ["test2"]]
