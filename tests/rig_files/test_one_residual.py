@@ -158,10 +158,11 @@ def test_a_stuck_bit_skips_levels_of_the_force(size):
 
 
 @pytest.mark.parametrize("step", [30.0, 40.0])
-def test_a_step_of_a_coarse_converter_is_no_stuck_bit(step):
+def test_a_step_of_a_coarse_converter_is_reported_as_no_stuck_bit(step):
     record = sine_record(points=1000)
     rounded = replace(record, force=step * np.round(record.force / step))
-    assert not [*no_bit_is_stuck(View(rounded))]
+    (finding,) = no_bit_is_stuck(View(rounded))
+    assert finding.text.startswith(f"the force changes in steps of {step:g} N, ")
 
 
 @pytest.mark.parametrize("jump", [-300, -100, -60, 60, 100, 300])

@@ -24,7 +24,7 @@ _UNEVEN = 0.55  # standard deviation over mean of the lengths of the lines; thos
 _SLOPES = 0.6  # different slopes, of the number of lines: a coarse converter has fewer
 _SHORT_LINE = 2  # samples: shorter ones are the two sides of a bend between samples
 _LEAP, _STANDS_OUT = 0.02, 6.0  # of the peak-to-peak force; times the steps around it
-_STEPS = 1.5  # steps of the converter: a leap is more than one
+_STEPS = 1.5  # steps of a converter: less is one of them
 _FAST = 0.3  # of the peak velocity: slower, friction makes a force leap
 _LEAPS, _LEAPS_A_CYCLE = 6, 2.0  # at least; bundled rigs reach 0.5 a cycle
 _EDGE = 0.05  # of two bands: what samples leave of the band between skipped ones
@@ -93,11 +93,14 @@ def no_bit_is_stuck(view: View) -> Iterator[Finding]:
     if not np.any(np.abs(np.diff(force)) >= least):
         return
     levels = np.unique(force)
-    least = max(least, _STEPS * float(np.percentile(np.diff(levels), 25)))
     width = _every_second_band(levels, least) or _crossed_in_motion(view, levels, least, len(cycles.starts))
-    if width:
+    step = float(np.percentile(np.diff(levels), 25))
+    if width > _STEPS * step:
         text = f"the force leaps by about {number(width, 3)} N in full motion, over levels that no sample has or for a"
         yield Finding("W_COARSE", f"{text} single sample: a bit of its converter is stuck or flips")
+    elif width:
+        text = f"the force changes in steps of {number(step, 3)} N, {percent(step / cycles.force.span)} of its range"
+        yield Finding("W_COARSE", f"{text} from peak to peak: choose a smaller range of its converter")
 
 
 def _every_second_band(levels: Floats, least: float) -> float:
