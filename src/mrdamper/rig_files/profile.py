@@ -128,11 +128,10 @@ class CurrentSource(Table):
 
     def fitting(self, path: Path, test: str) -> list[str]:
         """Return the patterns of `values` that match a file or a test of it, else its folder, whatever the case."""
-        names = [f"/{name}".casefold() for name in (path.name, path.stem, test) if name]
-        whole, folder = [f"//{path.as_posix()}{end}".casefold() for end in ("", f"/{test}")], path.parent.name.casefold()
-        texts = {pattern: whole if "/" in pattern else names for pattern in self.values}  # a/test1.csv, */a/test1.csv
+        names, whole = (path.name, path.stem, test), (f"/{path.as_posix()}", f"/{path.as_posix()}/{test}")
+        texts = {p: [f"/{text}".casefold() for text in (whole if "/" in p else names)] for p in self.values}
         named = [p for p, of in texts.items() if any(fnmatchcase(text, f"*/{p.casefold()}") for text in of)]
-        return named or [pattern for pattern in self.values if pattern.casefold() == folder]
+        return named or [pattern for pattern in self.values if pattern.casefold() == path.parent.name.casefold()]
 
 
 class Correction(Table):

@@ -99,8 +99,8 @@ def no_bit_is_stuck(view: View) -> Iterator[Finding]:
         text = f"the force leaps by about {number(width, 3)} N in full motion, over levels that no sample has or for a"
         yield Finding("W_COARSE", f"{text} single sample: a bit of its converter is stuck or flips")
     elif width:
-        text = f"the force changes in steps of {number(step, 3)} N, {percent(step / cycles.force.span)} of its range"
-        yield Finding("W_COARSE", f"{text} from peak to peak: choose a smaller range of its converter")
+        text = f"the force changes in steps of {number(step, 3)} N, {percent(step / cycles.force.span)} of the"
+        yield Finding("W_COARSE", f"{text} peak-to-peak force: a smaller range of its converter resolves it better")
 
 
 def _every_second_band(levels: Floats, least: float) -> float:
