@@ -13,6 +13,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import lfilter
+from scipy.stats import shapiro
 
 from mrdamper.data import Floats
 
@@ -55,8 +57,6 @@ def ewma(values: Floats, target: float, deviation: float, weight: float = 0.2, w
     Target and deviation are the mean and standard deviation of the process in control, `weight` is λ of the newest
     value, and the limits are `width` standard deviations of the average.
     """
-    from scipy.signal import lfilter
-
     averages = np.asarray(lfilter([weight], [1, weight - 1], values, zi=[(1 - weight) * target])[0])
     age = np.arange(1, values.size + 1)
     half = width * deviation * np.sqrt(weight / (2 - weight) * (1 - (1 - weight) ** (2 * age)))
@@ -75,8 +75,6 @@ class Capability:
 
 def is_normal(values: Floats) -> bool:
     """Tell if Shapiro and Wilk's test accepts a normal distribution; of many values, a regular subset is tested."""
-    from scipy.stats import shapiro
-
     if values.size < _FEWEST_NORMALITY or np.ptp(values) == 0:
         return True
     step = -(-values.size // _MOST_NORMALITY)

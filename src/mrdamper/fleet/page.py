@@ -1,13 +1,12 @@
 """Report of a population: one page from its table."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import polars as pl
 
 from mrdamper.data import Floats
 from mrdamper.data.atomic import write_file
@@ -21,9 +20,6 @@ from mrdamper.report.page import render_page
 from mrdamper.report.plots.figure import Figure, new_figure
 from mrdamper.report.plots.style import PALETTE, picture_of
 
-if TYPE_CHECKING:
-    import polars as pl
-
 _MAX_CHART_POINTS = 500  # of a chart; with more dampers each point is the median of several
 _WORST = 10
 _MAX_LISTED = 50  # refused or failed dampers, and suspects, that the page lists
@@ -35,8 +31,6 @@ def write_page(table: Path, plan: Plan | None, limits: Mapping[str, ColumnLimits
     Pass and fail are stated only with limits (by column of the table). Raises `ColumnError` if a limit is for no column
     of numbers, `OutputError` if the page cannot be written.
     """
-    import polars as pl
-
     kept = [c for c in pl.read_parquet_schema(table) if c != "loops"]
     whole = with_features(pl.read_parquet(table, columns=kept))
     unknown = [name for name in limits if name not in whole.columns or not whole[name].dtype.is_numeric()]
@@ -78,8 +72,6 @@ def write_page(table: Path, plan: Plan | None, limits: Mapping[str, ColumnLimits
 
 
 def _other_rigs(done: pl.DataFrame, plan: Plan | None) -> list[str]:
-    import polars as pl
-
     other = done.filter(pl.col("findings").str.contains(OTHER_RIG))
     if plan is None or not other.height:
         return []
@@ -154,8 +146,6 @@ def _chart(values: Floats, first: Any, ranges: Any, average: Any, about: tuple[s
 
 
 def _worst(table: Path, line: pl.DataFrame, plan: Plan | None) -> dict[str, Any] | None:
-    import polars as pl
-
     if plan is None or not line.height:
         return None
     far = line.drop_nulls("loop_deviation").sort("loop_deviation", descending=True).head(_WORST)

@@ -1,14 +1,12 @@
 """Parquet files with many dampers, one row per sample."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import polars as pl
 
 from mrdamper.data import Dataset, Run
 from mrdamper.errors import ColumnError, InputError, UnitError
@@ -16,9 +14,6 @@ from mrdamper.fleet.item import FleetError, Item, make_item
 from mrdamper.fleet.profile import FACTS, FleetProfile
 from mrdamper.rig_files.dataset_folder import run_of
 from mrdamper.rig_files.dataset_samples import OPTIONAL, REQUIRED
-
-if TYPE_CHECKING:
-    import polars as pl
 
 
 def is_parquet_folder(paths: Sequence[Path], profile: FleetProfile) -> bool:
@@ -29,8 +24,6 @@ def is_parquet_folder(paths: Sequence[Path], profile: FleetProfile) -> bool:
 
 def parquet_items(paths: Sequence[Path], profile: FleetProfile) -> list[Item]:
     """Find the dampers of Parquet files and their rows in each; a file that cannot be used is an item with an error."""
-    import polars as pl
-
     places_of: dict[Item, list[tuple[str, tuple[int, int]]]] = {}
     refused = []
     for path in paths:
@@ -68,8 +61,6 @@ def parquet_items(paths: Sequence[Path], profile: FleetProfile) -> list[Item]:
 
 def parquet_dataset(item: Item) -> Dataset:
     """Read the records of one damper from Parquet files; raises `InputError` if the channels of a run do not match."""
-    import polars as pl
-
     parts = []
     for path, (first, count) in zip(item.paths, item.rows, strict=True):
         with _refusing_damage(Path(path)):
@@ -107,8 +98,6 @@ def _refusing_damage(path: Path) -> Iterator[None]:
 
 
 def _columns(path: Path) -> list[str] | None:
-    import polars as pl
-
     try:
         with _refusing_damage(path):
             return [*pl.read_parquet_schema(path)]

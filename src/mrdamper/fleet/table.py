@@ -1,18 +1,15 @@
 """Table of a fleet: rows of the journal as one Parquet file, one row per damper, in constant memory."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterable, Iterator
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import polars as pl
 
 from mrdamper.data.atomic import write_file
 from mrdamper.fleet.plan import Plan
-
-if TYPE_CHECKING:
-    import polars as pl
 
 _ROWS_IN_MEMORY, _ROWS_PER_GROUP = 1_000, 10_000  # rows held in memory, and rows of a group in the file
 TIMES = ("wall_time_s", "cpu_time_s", "finished_time_utc", "host_name")  # differ from run to run; nothing else does
@@ -33,8 +30,6 @@ def write_table(rows: Iterable[dict[str, Any]], parameters: Iterable[str], plan:
     columns `rebound_N_0.1m_s_1A` and `compression_N_...`. Raises `OutputError` or `ResourceError` (E_DISK_FULL) if the
     file cannot be written.
     """
-    import polars as pl
-
     forces = () if plan is None else force_columns(plan)
     schema = _schema(tuple(parameters), forces)
     with write_file(path) as target:
@@ -64,8 +59,6 @@ def force_columns(plan: Plan) -> tuple[str, ...]:
 
 
 def _schema(parameters: tuple[str, ...], forces: tuple[str, ...]) -> dict[str, pl.DataType]:
-    import polars as pl
-
     kinds: dict[str, Any] = dict.fromkeys(_TEXT, pl.String)
     kinds["golden"] = pl.Boolean
     kinds |= dict.fromkeys(("runs", "tests_missing"), pl.Int64)

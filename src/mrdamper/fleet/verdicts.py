@@ -1,18 +1,15 @@
 """Outliers and their causes, and drift of the rig or of production, from the table of a population."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import polars as pl
+from scipy.stats import linregress, trim_mean
 
 from mrdamper.data import Floats
-
-if TYPE_CHECKING:
-    import polars as pl
 
 FEATURES = {  # title and unit by column
     "force_off_N": ("damping force at the lowest current", "N"),
@@ -34,8 +31,6 @@ _CAUSES = (
 
 def with_features(frame: pl.DataFrame) -> pl.DataFrame:
     """Add half the difference of rebound and compression at the highest speed, at the lowest current and its rise."""
-    import polars as pl
-
     ladder = [c for c in frame.columns if c.startswith("rebound_N_")]
     if not ladder:
         return frame.with_columns(force_off_N=pl.lit(None, pl.Float64), force_rise_N=pl.lit(None, pl.Float64))
@@ -139,16 +134,12 @@ def drift(values: Floats, sessions: Sequence[str], serials: Sequence[str], golde
 
 def _by_session(logs: Floats, at: np.ndarray, chosen: np.ndarray, count: int) -> Floats:
     """Mean of each session without the highest and the lowest tenth, robust against faulty dampers."""
-    from scipy.stats import trim_mean
-
     inside = [logs[chosen & (at == i)] for i in range(count)]
     return np.array([trim_mean(values, 0.1) if values.size else np.nan for values in inside])
 
 
 def _trend(share: Floats, means: Floats) -> tuple[float, bool]:
     """Change over the whole time, and whether it is significant."""
-    from scipy.stats import linregress
-
     finite = np.isfinite(means)
     if np.sum(finite) < 3:
         return np.nan, False

@@ -20,6 +20,8 @@ from typing import Any
 from fpdf import FPDF, FontFace
 from fpdf.enums import Align, TableBordersLayout, TextEmphasis
 from fpdf.text_region import TextColumns
+from pypdf import PdfReader, PdfWriter
+from pypdf.generic import ArrayObject, DecodedStreamObject, DictionaryObject, NameObject
 
 from mrdamper.report.fonts import Fallback, fallback_fonts
 from mrdamper.report.page import paper_size
@@ -360,17 +362,12 @@ class _Writer:
 
 def _size_of(figure: bytes) -> tuple[float, float]:
     """Width and height [mm] of a PDF of one page."""
-    from pypdf import PdfReader
-
     box = PdfReader(io.BytesIO(figure)).pages[0].mediabox
     return float(box.width) * 25.4 / 72, float(box.height) * 25.4 / 72
 
 
 def _with_figures(text: bytes, places: list[Any], figures: Mapping[str, bytes]) -> bytes:
     """Place figures, each as one object, because parsing their drawing takes seconds."""
-    from pypdf import PdfReader, PdfWriter
-    from pypdf.generic import ArrayObject, DecodedStreamObject, DictionaryObject, NameObject
-
     whole = PdfWriter(clone_from=io.BytesIO(text))
     whole.metadata = {key: value for key, value in (whole.metadata or {}).items() if key != "/CreationDate"}
     point = 72 / 25.4
