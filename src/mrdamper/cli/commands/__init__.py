@@ -1,1 +1,1 @@
-"""One command per module; `register(app)` adds it. Heavy imports stay inside the functions."""
+"""One command per module, on its `app`. Heavy imports stay inside the functions."""
