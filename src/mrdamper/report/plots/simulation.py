@@ -21,9 +21,7 @@ MOST_DRAWN = 4  # runs
 
 def histories(runs: Mapping[str, Simulation]) -> Figure:
     """Acceleration of the last coordinate's end, the widest span, and damper force over time."""
-    shown = _drawn(runs)
-    first = next(iter(shown.values()))
-    point = int(np.argmax(first.peaks["acceleration_m_s2"])) if first.system.ground is not None else 0
+    shown, first, point = _drawn(runs)
     span = list(first.system.spans)[int(np.argmax(first.peaks["drift_m"]))]
     figure, top, middle, bottom = new_figure(3, 1, 6.4, right=2.2 if len(shown) > 1 else 0.12)
     for colour, (title, run) in zip(PALETTE, shown.items(), strict=False):
@@ -42,9 +40,7 @@ def histories(runs: Mapping[str, Simulation]) -> Figure:
 
 def spectra(runs: Mapping[str, Simulation]) -> Figure:
     """Draw the power spectral density of the accelerations among the objectives, and loops about the largest force."""
-    shown = _drawn(runs)
-    first = next(iter(shown.values()))
-    point = int(np.argmax(first.peaks["acceleration_m_s2"])) if first.system.ground is not None else 0
+    shown, first, point = _drawn(runs)
     figure, left, right = new_figure(1, 2, 3.0)
     left.x.log = left.y.log = True
     for colour, (title, run) in zip(PALETTE, shown.items(), strict=False):
@@ -63,8 +59,11 @@ def spectra(runs: Mapping[str, Simulation]) -> Figure:
     return figure
 
 
-def _drawn(runs: Mapping[str, Simulation]) -> dict[str, Simulation]:
-    return dict(islice(runs.items(), MOST_DRAWN))
+def _drawn(runs: Mapping[str, Simulation]) -> tuple[dict[str, Simulation], Simulation, int]:
+    """Return the runs that are drawn, the first, and its coordinate of the largest acceleration; of a car the body."""
+    first = next(iter(runs.values()))
+    point = int(np.argmax(first.peaks["acceleration_m_s2"])) if first.system.ground is not None else 0
+    return dict(islice(runs.items(), MOST_DRAWN)), first, point
 
 
 def power_spectral_density(signal: Floats, step: float, size: int) -> tuple[Floats, Floats]:
