@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from itertools import product
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
@@ -48,6 +48,8 @@ _SHARED_EXPLANATIONS = 3  # explanations of a run that others may have in common
 _RUNS_PER_ROUND = 16  # runs whose explanations are tried in a round, at least
 _KEEP_ODDS = 3.0  # logarithm of the odds from which an accepted explanation stays
 _SHIFT_ODDS = 9.0  # logarithm of the prior odds against shifted rows
+_EXCHANGE_ODDS = 6.0  # the same against two exchanged rows
+_SPARSE_ODDS = 20.0  # the same where the tests are no matrix of currents and motions
 _MIN_SHIFT_ODDS = -EMPTY_CELL_ODDS  # prior odds of shifted rows at least, where these complete the matrix of tests
 _MEMBER_ODDS = 4.0  # the same against a further run with the same cause
 _MAJORITY_ODDS = 6.0  # the same against another current of most runs at a current
@@ -282,7 +284,7 @@ class Search:
         ranked = sorted(map(self._of_group, groups), key=lambda proposal: -proposal.gain)
         yield from (self._smaller(proposal) for proposal in ranked[:_REFINED_EXPLANATIONS])
         if not self.found:
-            best = max(self._of_rows(), key=lambda proposal: proposal.gain, default=_NO_PROPOSAL)
+            best = max(self._of_rows(order[:_RUNS_PER_ROUND]), key=lambda proposal: proposal.gain, default=_NO_PROPOSAL)
             if best.explanations:
                 yield self._refined_rows(best, posterior)
 
@@ -577,13 +579,17 @@ class Search:
             proposal = best
         return proposal
 
-    def _of_rows(self) -> Iterator[JointExplanation]:
-        """Currents of other rows of the table of tests, all shifted by one from some row on."""
+    def _of_rows(self, suspects: Sequence[int]) -> Iterator[JointExplanation]:
+        """Currents of other rows of the table of tests: two rows exchanged, or all shifted by one from some row on."""
         order = [k for k, track in enumerate(self.tracks) if not track.current_changes]
         written = [float(self.tracks[k].current[0]) for k in order]
         rows, last = list(range(len(order))), len(order) - 1
         rigid = [self.tracks[k] for k in order]
         empty = irregularity(rigid, written)
+        for i, j in combinations(rows, 2):
+            if (order[i] in suspects or order[j] in suspects) and abs(written[i] - written[j]) > SAME_CURRENT:
+                odds = _EXCHANGE_ODDS if empty <= MAX_IRREGULARITY * len(rows) else _SPARSE_ODDS
+                yield self._of_currents({order[i]: written[j], order[j]: written[i]}, "current", odds)
         for step in (-1, 1):
             for first in range(last):
                 moved = [written[k if k < first else min(max(k + step, first), last)] for k in rows]
