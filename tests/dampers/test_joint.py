@@ -335,8 +335,7 @@ def test_a_refit_begins_where_the_derivatives_lead_unless_that_is_worse(problem,
 def test_slopes_by_the_search_axes_are_those_of_the_force(runs, problem, fit):
     motion = sine(MATRIX[5], 3, 20_000)
     picked = np.arange(0, motion.time.size, 97)
-    factor = np.ones(picked.size)
-    by_axes, by_parameters = force_slopes(problem.space, fit.point, fit.damper.one_model, motion, picked, factor)
+    by_axes, by_parameters = force_slopes(problem.space, fit.point, fit.damper.one_model, motion, picked)
     slopes = (by_axes @ by_parameters).T
     linear = {info.name for info in PlayBypass.parameters() if info.linear}
     held = {name: getattr(fit.damper.one_model, name) for name in linear}
@@ -349,7 +348,7 @@ def test_slopes_by_the_search_axes_are_those_of_the_force(runs, problem, fit):
     changing = replace(runs[3], id="changing", current=np.linspace(0.1, 0.9, runs[3].time.size))
     lagging = JointProblem([*runs[:3], changing], "play-bypass")
     start = np.append(fit.point, np.log([0.01, 0.01]))
-    assert force_slopes(lagging.space, start, fit.damper.one_model, motion, picked, factor) is None
+    assert force_slopes(lagging.space, start, fit.damper.one_model, motion, picked) is None
 
 
 def test_products_are_those_of_the_derivatives_with_the_linear_parameters_refitted(problem, fit):
@@ -379,7 +378,7 @@ def test_samples_of_some_runs_are_those_they_have_among_all(problem, fit):
     assert np.all(
         some.solve(fit.point).nrmse_pp.mean() <= np.sqrt(missed).mean() * 1.001
     )  # their own linear parameters
-    assert some.linear_rows(fit.point)[1].shape[1] == some.picked.size < whole.picked.size
+    assert some.linear_forces(fit.point)[1].shape[1] == some.picked.size < whole.picked.size
 
 
 def test_a_fit_begins_where_another_problem_ended(problem, fit):

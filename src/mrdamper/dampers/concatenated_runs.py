@@ -60,7 +60,7 @@ class JointResiduals:
         self.bounds = bounds_of(space.linear)
         self._set_weights(self.information)
         self._seen: tuple[Excitation, Excitation] | None = None
-        self._linear_at: tuple[Floats, Model, Floats, Floats, Floats] | None = None
+        self._columns_at: tuple[Floats, Model, Floats, Sequence[int]] | None = None
 
     def only(self, runs: Sequence[int]) -> JointResiduals:
         """Return the samples of some of the runs, in order; the others are evaluated but not used."""
@@ -71,9 +71,9 @@ class JointResiduals:
         table.information = self.information[list(runs)]
         table._seen = None
         table._set_weights(table.information)
-        if self._linear_at is not None:
-            point, reduced, rows, factor, _ = self._linear_at
-            table._linear_at = point, reduced, rows[:, kept], factor[kept], table.target
+        if self._columns_at is not None:
+            point, reduced, forces, places = self._columns_at
+            table._columns_at = point, reduced, forces[:, kept], places
         return table
 
     def _motion(self, point: Floats) -> Excitation:
@@ -107,40 +107,38 @@ class JointResiduals:
             self._seen = motion, motion.part(self.picked)
         return self._seen[1], model.state(motion)[self.picked]
 
-    def linear_rows(self, point: Floats) -> tuple[Model, Floats]:
-        """Model at a point without its linear parameters, and weighted rows of the linear least squares (L + 1, N).
+    def linear_forces(self, point: Floats) -> tuple[Model, Floats, Sequence[int]]:
+        """Model at a point without its linear parameters, and forces [N]: its own, and that per unit of parameters.
 
-        These are the forces per unit of each parameter and, last, the measured force less that of the model. Cached for
-        the last point.
+        Returns the places of the linear parameters among these forces, too. Cached for the last point, independent of
+        weights.
         """
-        last = self._linear_at
-        if last is None or last[4] is not self.target or not np.array_equal(last[0], point):
+        if self._columns_at is None or not np.array_equal(self._columns_at[0], point):
             reduced = self.space.without_linear(point)
-            rows = self._linear_rows(reduced, point)
-        else:
-            _, reduced, rows, factor, _ = last
-            rows = rows if factor is self.factor else rows * (self.factor / factor)
-        self._linear_at = point, reduced, rows, self.factor, self.target
-        return reduced, rows
+            self._columns_at = point, reduced, *self._linear_table(reduced, point)
+        return self._columns_at[1:]
 
-    def _linear_rows(self, reduced: Model, point: Floats) -> Floats:
-        """Return the rows of `linear_rows`, in one pass if possible."""
+    def _linear_table(self, reduced: Model, point: Floats) -> tuple[Floats, Sequence[int]]:
+        """Return forces of `linear_forces`, in one pass if possible, and the places."""
         motion, linear = self._motion(point), self.space.linear
         names = [info.name for info in type(reduced).parameters() if info.linear]  # one program for all problems
-        wanted = np.array([*(1 + names.index(info.name) for info in linear), 0])
-        rows = force_tangents(reduced, motion, names, self.picked, (wanted, self.factor))
+        rows = force_tangents(reduced, motion, names, self.picked)
         if rows is None:
             base, columns = linear_table(reduced, linear, *self._followed(reduced, point))
-            rows = np.vstack([columns.T, base]) * self.factor
-        np.subtract(self.target * self.factor, rows[-1], out=rows[-1])
-        return rows
+            return np.vstack([base, columns.T]), range(1, 1 + len(linear))
+        return rows, [1 + names.index(info.name) for info in linear]
 
     def solve(self, point: Floats) -> LinearSolution:
         """Linear parameters of least weighted squares at a point of the search axes; cached for the last point."""
         if self._solved is not None and np.array_equal(self._solved[0], point):
             return self._solved[1]
-        linear, (reduced, rows) = self.space.linear, self.linear_rows(point)
-        columns, right, products = rows[:-1].T, rows[-1], products_of(rows[:-1], rows)
+        linear, factor = self.space.linear, self.factor
+        reduced, forces, places = self.linear_forces(point)
+        rows = np.empty((len(places) + 1, factor.size))
+        for row, place in zip(rows, places, strict=False):
+            np.multiply(forces[place], factor, out=row)
+        right = np.multiply(self.target - forces[0], factor, out=rows[-1])
+        columns, products = rows[:-1].T, products_of(rows[:-1], rows)
         solution, held = solve_bounded(columns, right, *self.bounds, products)
         residual = columns @ solution - right
         errors = np.sqrt(np.add.reduceat(residual**2, self.begins)) / self.weights
@@ -190,8 +188,8 @@ class JointResiduals:
         along the axes.
         """
         motion = self._motion(point)
-        if (exact := force_slopes(self.space, point, model, motion, self.picked, self.factor)) is not None:
-            return exact
+        if (exact := force_slopes(self.space, point, model, motion, self.picked)) is not None:
+            return exact[0], np.multiply(exact[1], self.factor, out=exact[1])
         weights, box = self.weights[self.owner], self.space.box()
         slopes = forward_differences(lambda u: self.residual(u, model) * weights, point, residual, *box)
         return np.eye(point.size), slopes.T
@@ -207,9 +205,10 @@ class JointResiduals:
     def linearise(self, point: Floats, model: Model) -> tuple[Floats, Floats]:
         """Weighted residual of a model, and its derivatives by search axes and linear parameters."""
         residual = self.residual(point, model) * self.weights[self.owner]
-        _, rows = self.linear_rows(point)
+        _, forces, places = self.linear_forces(point)
+        columns = forces[places].T * self.factor[:, None]
         moved, slopes = self._moved(point, model, residual)
-        return residual, np.vstack([moved @ slopes, rows[:-1]]).T.copy()
+        return residual, np.column_stack([(moved @ slopes).T, columns])
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,13 +246,13 @@ class Linearisation:
 
 
 def force_slopes(
-    space: SearchSpace, point: Floats, model: Model, motion: Excitation, picked: NDArray[np.intp], factor: Floats
+    space: SearchSpace, point: Floats, model: Model, motion: Excitation, picked: NDArray[np.intp]
 ) -> tuple[Floats, Floats] | None:
     """Calculate derivatives of the force at some samples of a motion, the linear parameters held.
 
-    (D, K) of K parameters by the search axes, and (K, N) of the force by these, multiplied by a factor of each sample.
-    At a bound they are one-sided, because the force of a model may have a kink there. None where the coil's lags are
-    searched, or where the model has no tangents.
+    (D, K) of K parameters by the search axes, and (K, N) of the force by these. At a bound they are one-sided, because
+    the force of a model may have a kink there. None where the coil's lags are searched, or where the model has no
+    tangents.
     """
     if any(axis.name in (RISE, FALL) for axis in space.axes):
         return None
@@ -261,10 +260,12 @@ def force_slopes(
     names = [info.name for info in space.model_type.parameters() if not info.linear]
     inside = space.inside(point)
     moved = replace(model, **{name: getattr(inside, name) for name in names})
+    tangents = force_tangents(moved, motion, names, picked)
+    if tangents is None:
+        return None
     by_axes = space.along_axes(point, names)
-    used = np.flatnonzero(by_axes.any(axis=0))
-    tangents = force_tangents(moved, motion, names, picked, (1 + used, factor))
-    return None if tangents is None else (by_axes[:, used], tangents)
+    used = by_axes.any(axis=0)
+    return by_axes[:, used], tangents[1:][used]
 
 
 def concatenate(motions: Iterable[Excitation]) -> Excitation:

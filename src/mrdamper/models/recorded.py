@@ -15,7 +15,7 @@ from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.physics.motion.path import memoize_per_path
 from mrdamper.physics.motion.traced import TracedMotion, TracedStep
 from mrdamper.tracing import Tape, TraceError, program
-from mrdamper.tracing.compiled.record import Channels, RecordProgram, Weighted
+from mrdamper.tracing.compiled.record import Channels, RecordProgram
 from mrdamper.tracing.program import postorder
 from mrdamper.tracing.tangent import with_tangents
 
@@ -64,16 +64,11 @@ def _response(model: Any, motion: Any) -> tuple[Any, Any]:
 
 
 def force_tangents(
-    model: Any,
-    motion: Excitation,
-    names: Sequence[str],
-    picked: NDArray[np.intp] | None = None,
-    weighted: Weighted | None = None,
+    model: Any, motion: Excitation, names: Sequence[str], picked: NDArray[np.intp] | None = None
 ) -> Floats | None:
     """(1 + K, N) force and its derivatives by K parameters along a motion, memory included, in one compiled pass.
 
-    Of all samples, or of those at some ascending indices; all outputs, or some `weighted`. None where there is no
-    compiler, the motion is short, or
+    Of all samples, or of those at some ascending indices. None where there is no compiler, the motion is short, or
     the model has no derivative of this kind.
     """
     return _along(
@@ -82,7 +77,6 @@ def force_tangents(
         tuple(names),
         lambda free, traced, tape: with_tangents(tape, _response(free, traced)[0], names),
         picked,
-        weighted,
     )
 
 
@@ -97,7 +91,6 @@ def _along(
     names: tuple[str, ...] | None,
     outputs: Callable[[Any, Any, Tape], Mapping[str, Any]],
     picked: NDArray[np.intp] | None = None,
-    weighted: Weighted | None = None,
 ) -> Floats | None:
     """(K, N) outputs of a program of the model along a motion."""
     kind: Any = model.__class__
@@ -110,8 +103,7 @@ def _along(
         return outputs(kind(**free), traced_motion(tape, inputs), tape)
 
     read = _READ.setdefault(motion, {})
-    key, channels = (kind, names), partial(channel, motion)
-    return compiled_outputs(key, values, traced, CHANNELS, read, channels, picked, weighted=weighted)
+    return compiled_outputs((kind, names), values, traced, CHANNELS, read, partial(channel, motion), picked)
 
 
 def compiled_outputs(
@@ -123,14 +115,13 @@ def compiled_outputs(
     channel: Callable[[str], Floats],
     picked: NDArray[np.intp] | None = None,
     begins: NDArray[np.intp] | None = None,
-    weighted: Weighted | None = None,
 ) -> Floats | None:
     """(K, N) outputs of a compiled program along a record, or None: no compiler, derivative or solution.
 
     `key` is that of the cached programs: traced model type, and parameters of the tangents. `traced` writes the outputs
     at one sample on a tape, from parameters, whose values are `values`, and inputs. `channel` returns the (N,) array of
-    an input; `read` caches those that programs use. Outputs are those at the samples `picked`, all or some `weighted`,
-    and the memory is reset at `begins`.
+    an input; `read` caches those that programs use. Outputs are those at the samples `picked`, and the memory is reset
+    at `begins`.
     """
     given = tuple(map(float, values.values()))
     # Values are given by position: another order is another program.
@@ -152,9 +143,7 @@ def compiled_outputs(
         programs.append(record)
     if (used := tuple(record.program.tape.inputs)) not in read:
         read[used] = Channels.of(map(channel, used))
-    if derived is None:
-        return None
-    result = record.compiled_along(given, derived, record.starts, read[used], picked, begins, weighted)
+    result = derived is not None and record.compiled_along(given, derived, record.starts, read[used], picked, begins)
     return result.outputs if result and result.failed < 0 else None
 
 

@@ -188,7 +188,7 @@ def _fill(result: Program, order: list[Any], scopes: dict[int, Scope]) -> None:
 
 _SAME_NAME = ("sqrt", "exp", "expm1", "log", "log1p", "tan", "tanh")
 FUNCTIONS = dict(zip(_SAME_NAME, _SAME_NAME, strict=True)) | {"arctan": "atan", "arctanh": "atanh"}  # in C, JS, Python
-MARKS = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"} | {
+_MARKS = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"} | {
     "less": "<", "less_equal": "<=", "greater": ">", "greater_equal": ">=", "equal": "==", "not_equal": "!="
 }  # fmt: skip
 
@@ -197,7 +197,7 @@ class Writer(ABC):
     """Writer of the expressions of a program; subclasses define the operations and numbers of a language."""
 
     formats: ClassVar[Mapping[str, str]] = {  # common to C, JavaScript and Python
-        **{op: f"({{}} {mark} {{}})" for op, mark in MARKS.items()},
+        **{op: f"({{}} {mark} {{}})" for op, mark in _MARKS.items()},
         "negative": "(-{})",
     }
 

@@ -9,12 +9,6 @@
 #endif
 #define R(x) x
 #define M(function) function
-#define STORE(place, value) \
-    for (k = 0; k < OUTPUTS; k++) { \
-        if (rows[k] >= 0) { \
-            outputs[rows[k] * count + (place)] = (factor ? factor[place] : 1.0) * (value); \
-        } \
-    }
 typedef double real;
 typedef long long whole;
 

@@ -4,25 +4,17 @@ EXPORT int prepare(const real *p, real *d)
 }
 
 /* Outputs at every sample, or at the `count` samples whose ascending indices are picked, the only ones that a program
-   without memory computes; the memory starts anew at `begins`, which ends with the number of samples. Each output is
-   stored in one of the rows, or in none (-1), multiplied by a factor of each sample if there is one. */
+   without memory computes; the memory starts anew at `begins`, which ends with the number of samples. */
 EXPORT whole along(const real *p, const real *d, real *memory, whole samples, const real *const *inputs,
-    const whole *strides, const whole *picked, whole count, const whole *begins, const whole *rows, const real *factor,
-    real *outputs)
+    const whole *strides, const whole *picked, whole count, const whole *begins, real *outputs)
 {
     real s[MEMORY], u[INPUTS], out[OUTPUTS], m[KEPT];
-    whole i = 0, k, at = 0;
-#ifdef LANES
-    if (!begins && samples >= LANES * WARM_UP && __builtin_cpu_supports("avx2")
-        && along_lanes(p, d, memory, samples / LANES, inputs, strides, picked, &at, count, rows, factor, outputs)) {
-        i = samples / LANES * LANES;
-    }
-#endif
+    whole i, k, at = 0;
     memcpy(s, memory, sizeof s);
     for (k = 0; k < KEPT; k++) {
         m[k] = NAN;
     }
-    for (; i < samples; i++) {
+    for (i = 0; i < samples; i++) {
         if (!REMEMBERS && picked && (at == count || i != picked[at])) {
             continue;
         }
@@ -37,7 +29,9 @@ EXPORT whole along(const real *p, const real *d, real *memory, whole samples, co
             break;
         }
         if (at < count && i == (picked ? picked[at] : i)) {
-            STORE(at, out[k])
+            for (k = 0; k < OUTPUTS; k++) {
+                outputs[k * count + at] = out[k];
+            }
             at++;
         }
     }

@@ -19,10 +19,8 @@ from mrdamper.tracing.python import python_functions, python_source
 Floats = NDArray[np.float64]
 _MIN_COMPILED_LINES = 1_000_000  # lines executed in the interpreter, from which a program is compiled
 _COMPARED_SAMPLES = 24  # samples on which a new library is compared with the interpreter
-_LONG_SAMPLES = 4_000  # of a record that is computed in chunks
 _POSITIVE = {"current": 1.0, "frequency": 1.0, "amplitude": 1e-2}  # positive inputs of this comparison [A], [Hz], [m]
 _MAX_DIFFERENCE = 1e-9  # relative difference allowed in this comparison
-Weighted = tuple[NDArray[np.intp], Floats]  # (K,) places of outputs, and (N,) what they are multiplied by
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +60,6 @@ class RecordProgram:
         self.program = program
         self.starts = tuple(program.tape.starts.values())
         self._prepare, self.step = python_functions(program)
-        self._places = np.arange(len(program.outputs))
         self._walked = 0
 
     def prepare(self, given: Sequence[float]) -> tuple[float, ...] | None:
@@ -95,17 +92,15 @@ class RecordProgram:
         channels: Sequence[ArrayLike] | Channels,
         picked: NDArray[np.intp] | None = None,
         begins: NDArray[np.intp] | None = None,
-        weighted: Weighted | None = None,
     ) -> Along | None:
         """Compute the same as `along`, compiled whatever the length; None without a usable compiler.
 
-        Outputs are those of all samples, or of some at ascending indices; all, or some `weighted`. At `begins` the
-        memory is reset.
+        Outputs are those of all samples, or of some at ascending indices. At `begins` the memory is reset.
         """
         if (library := self._library) is None:
             return None
         channels = channels if isinstance(channels, Channels) else Channels.of(channels)
-        return self._run(library, given, derived, memory, channels, picked, begins, weighted)
+        return self._run(library, given, derived, memory, channels, picked, begins)
 
     def interpreted_along(
         self, given: Sequence[float], derived: Sequence[float], memory: Sequence[float], arrays: Sequence[Floats]
@@ -131,17 +126,13 @@ class RecordProgram:
         channels: Channels,
         picked: NDArray[np.intp] | None = None,
         begins: NDArray[np.intp] | None = None,
-        weighted: Weighted | None = None,
     ) -> Along:
         numbers = np.array([*given, 0.0, *derived, 0.0, *memory, 0.0], dtype=float)
         p = numbers.ctypes.data
         d = p + 8 * (len(given) + 1)
         s = d + 8 * (len(derived) + 1)
         size = channels.arrays[0].size
-        places, factor = (self._places, None) if weighted is None else weighted
-        rows = np.full(len(self.program.outputs), -1, dtype=np.int64)
-        rows[places] = np.arange(len(places))
-        outputs = np.empty((len(places), size if picked is None else picked.size))
+        outputs = np.empty((len(self.program.outputs), size if picked is None else picked.size))
         indices = None if picked is None else np.ascontiguousarray(picked, dtype=np.int64)
         restarts = None if begins is None else np.append(begins, size).astype(np.int64)
         along = library.along
@@ -149,8 +140,7 @@ class RecordProgram:
         failed = along(
             ctypes.c_void_p(p), ctypes.c_void_p(d), ctypes.c_void_p(s), ctypes.c_longlong(size), *channels.addresses,
             None if indices is None else address(indices), ctypes.c_longlong(outputs.shape[1]),
-            None if restarts is None else address(restarts), address(rows),
-            None if factor is None else address(factor), address(outputs),
+            None if restarts is None else address(restarts), address(outputs),
         )  # fmt: skip
         return Along(outputs, tuple(numbers[-1 - len(memory) : -1].tolist()), int(failed))
 
@@ -187,17 +177,8 @@ class RecordProgram:
         wanted = expected.outputs[:, :size]
         if not np.isfinite(wanted).all():
             return True
-        if not _are_equal(outputs.outputs[:, :size], wanted):
-            return False
-        lasting = Channels.of(np.resize(array, _LONG_SAMPLES) for array in arrays)
-        begins = (None, np.zeros(1, dtype=np.int64))  # the second is computed sample by sample
-        long, expected = (self._run(library, given, derived, self.starts, lasting, None, at) for at in begins)
-        return long.failed == expected.failed and (long.failed >= 0 or _are_equal(long.outputs, expected.outputs))
-
-
-def _are_equal(outputs: Floats, expected: Floats) -> bool:
-    room = _MAX_DIFFERENCE * np.abs(expected).max(axis=1, keepdims=True, initial=0.0)
-    return bool(np.all((np.abs(outputs - expected) <= room) | ~np.isfinite(expected)))
+        room = _MAX_DIFFERENCE * np.abs(wanted).max(axis=1, keepdims=True, initial=0.0)
+        return bool(np.all(np.abs(outputs.outputs[:, :size] - wanted) <= room))
 
 
 def address(array: np.ndarray) -> ctypes.c_void_p:

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
 from pathlib import Path
-from typing import ClassVar
 
 from mrdamper.tracing import Expression, Program
 from mrdamper.tracing.c_writer import CWriter
 from mrdamper.tracing.expression import SAMPLE
-from mrdamper.tracing.program import MARKS, Branch, Let, Statement, postorder
+from mrdamper.tracing.program import Branch, Let, Statement, postorder
 
 _HERE = Path(__file__)
 PREAMBLE = _HERE.with_name("preamble.c").read_text(encoding="utf-8")
@@ -25,8 +23,6 @@ class ArrayWriter(CWriter):
     """
 
     member = "["
-    formats: ClassVar[Mapping[str, str]] = {**CWriter.formats, "select": "({} ? {} : {})"}
-    changed: ClassVar[str] = "{}"  # condition of numbers that are kept
 
     def __init__(self, program: Program, keep: bool = False):
         super().__init__(program)
@@ -57,8 +53,8 @@ class ArrayWriter(CWriter):
                 fresh[id(node)] = f"m[{self.kept}]"
                 lines.append(f"        m[{self.kept}] = {self._expanded(node)};")
                 self.kept += 1
-            changed = " | ".join(f"({place} != {value})" for place, value in zip(held, inputs, strict=True))
-            text += f"    if ({self.changed.format(changed)}) {{\n" + "\n".join(lines) + "\n    }\n"
+            changed = " || ".join(f"{place} != {value}" for place, value in zip(held, inputs, strict=True))
+            text += f"    if ({changed}) {{\n" + "\n".join(lines) + "\n    }\n"
             self._places |= fresh
             self._kept |= fresh.keys()
         return text
@@ -74,7 +70,10 @@ class ArrayWriter(CWriter):
             return self.number(value)  # type: ignore[arg-type]
         if id(value) in self._places:
             return self._places[id(value)]
-        return self.formats[value.op].format(*(self._expanded(part) for part in value.args))
+        parts = [self._expanded(part) for part in value.args]
+        if value.op == "select":
+            return f"({parts[0]} ? {parts[1]} : {parts[2]})"
+        return self.formats[value.op].format(*parts)
 
     def text(self, value: object) -> str:
         place = self._places.get(id(value)) if isinstance(value, Expression) else None
@@ -95,53 +94,6 @@ class ArrayWriter(CWriter):
 
     def memory(self, name: str) -> str:
         return self._places[id(self.program.tape.memory[name])]
-
-
-class LaneWriter(ArrayWriter):
-    """C of vectors with an element for each of several samples: both values of a branch are computed."""
-
-    constant, answer, changed = "const lanes", "const masks", "_mm256_movemask_pd((lanes)({}))"
-    formats: ClassVar[Mapping[str, str]] = {
-        **{op: text for op, text in ArrayWriter.formats.items() if op in MARKS or op == "negative"},
-        **{
-            "sqrt": "_mm256_sqrt_pd({})",
-            "exp": "exponential({})",
-            "absolute": "_mm256_andnot_pd(ALL(-0.0), {})",
-            "sign": "sign_of({})",
-        },
-        **{"minimum": "_mm256_min_pd({1}, {0})", "maximum": "_mm256_max_pd({1}, {0})"},
-        "select": "CHOSEN({}, {}, {})",
-    }
-
-    @classmethod
-    def writes(cls, node: object) -> bool:
-        """Tell if it writes an operation: numbers computed from numbers, and choices by answers."""
-        if not isinstance(node, Expression) or node.stage < SAMPLE or node.op in ("input", "memory"):
-            return isinstance(node, Expression)
-        numbers = node.args[1:] if node.op == "select" else node.args
-        return node.op in cls.formats and not any(getattr(part, "logical", False) for part in numbers)
-
-    def __init__(self, program: Program, keep: bool = False):
-        self._alike = ArrayWriter(program)  # for what is the same in all lanes
-        super().__init__(program, keep)
-
-    def text(self, value: object) -> str:
-        if not isinstance(value, Expression) or value.stage < SAMPLE:
-            return f"ALL({self._alike.text(value)})"
-        return super().text(value)
-
-    def _expanded(self, value: object) -> str:
-        if not isinstance(value, Expression) or value.stage < SAMPLE:
-            return f"ALL({self._alike._expanded(value)})"
-        return super()._expanded(value)
-
-    def branch(self, statement: Branch) -> list[str]:
-        condition, then, otherwise = statement.select.args
-        value = self.formula(statement.select)
-        if condition.stage < SAMPLE:
-            value = f"{self._alike.text(condition)} ? {self.text(then)} : {self.text(otherwise)}"
-        both = [*self.lines(statement.then, 0), *self.lines(statement.otherwise, 0)]
-        return [*both, f"{self.constant} {self.name(statement.select)} = {value};"]
 
 
 # Inputs that are constant over most samples.
@@ -199,17 +151,6 @@ def functions(program: Program, index: int = 0, keep: bool = False) -> str:
     )
 
 
-def _lanes(program: Program) -> str:
-    """C that computes several samples at once; empty for programs with loops, tables or other functions."""
-    results = [*program.outputs.values(), *program.tape.updates.values()]
-    checked = program.guards(SAMPLE) or any(getattr(value, "logical", False) for value in results)
-    if checked or not program.tape.memory or not all(map(LaneWriter.writes, postorder(results))):
-        return ""
-    writer = LaneWriter(program, keep=True)
-    step = writer.refresh + writer.sample() + writer.results()
-    return _HERE.with_name("lanes.c").read_text(encoding="utf-8").replace("    STEP\n", step)
-
-
 def record_source(program: Program) -> str:
     """C of a library that prepares a program and runs it along a record."""
     tape = program.tape
@@ -218,4 +159,4 @@ def record_source(program: Program) -> str:
     defined = "".join(f"#define {name} {max(1, size)}\n" for name, size in sizes.items())
     defined += f"#define REMEMBERS {int(bool(tape.memory))}\n"
     along = _HERE.with_name("record.c").read_text(encoding="utf-8")
-    return f"{PREAMBLE}{functions(program, keep=True)}\n{defined}\n{_lanes(program)}{along}"
+    return f"{PREAMBLE}{functions(program, keep=True)}\n{defined}\n{along}"
