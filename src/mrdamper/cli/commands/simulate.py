@@ -50,16 +50,13 @@ def simulate(
     as_json: bool = typer.Option(False, "--json", help="Print JSON, SI units."),
 ) -> None:
     """Simulate a vehicle or building with dampers and a controller."""
-    from mrdamper.data.atomic import require_writable
     from mrdamper.systems.controller_comparison import compare_controllers
     from mrdamper.systems.inputs import load_input
     from mrdamper.systems.monte_carlo import draw, monte_carlo
     from mrdamper.systems.simulate import SystemLoop, simulate_system
     from mrdamper.systems.system_file import load_system
 
-    if out is None and compare:
-        raise InputError("--compare without --out", remedy="give a folder for the report")
-    require_writable(out)
+    _refuse_no_folder(out, compare)
     loaded, shaken_by = load_system(system), load_input(*parse_named(source, "--input"), time_scale=time_scale)
     dampers = {} if without else _dampers(loaded, damper, system)
     highest = _amperes(current, volts, dampers)
@@ -90,6 +87,14 @@ def simulate(
     _print_comparison(compared)
     _print_warnings(done)
     _print_bands(done, bands, dampers)
+
+
+def _refuse_no_folder(out: Path | None, compare: list[str] | None) -> None:
+    from mrdamper.data.atomic import require_writable
+
+    if out is None and compare:
+        raise InputError("--compare without --out", remedy="give a folder for the report")
+    require_writable(out)
 
 
 def _facts(system: str, source: str, time_scale: float, damper: Path | str) -> dict[str, str]:
