@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from itertools import pairwise
+from pathlib import Path
 from time import process_time
 
 import numpy as np
@@ -598,6 +600,40 @@ def test_a_structure_beside_a_record_contradicts_the_unit_of_its_column(tmp_path
     result = import_files([tmp_path])
     assert [refusal.error.code for refusal in result.refusals] == ["E_AMBIGUOUS"]
     assert len(result.records) == 1
+
+
+@pytest.mark.parametrize(
+    ("head", "notes", "refused"),
+    [
+        (
+            "# Sign convention: extension positive, tension positive\n",
+            "compression is positive for displacement and force",
+            1,
+        ),
+        ("# Sign: compression positive\n", "Extension and tension are positive for displacement and force", 1),
+        ("# Sign: compression positive\n", "Compression is positive for displacement and force", 0),
+    ],
+)
+def test_signs_that_a_file_and_its_notes_state_in_opposite_senses_are_asked_about(tmp_path, head, notes, refused):
+    rows = "".join(f"{t:.3f},{x:.7f},{f:.6f}\n" for t, x, f in zip(T, -X, -force(0.5), strict=True))
+    (tmp_path / "a_0.5A.csv").write_text(head + "time [s],displacement [mm],force [N]\n" + rows)
+    (tmp_path / "README.md").write_text(f"Sign convention: {notes}.\n")
+    result = import_files([tmp_path])
+    assert {refusal.error.code for refusal in result.refusals} == ({"E_SIGN_CONVENTION"} if refused else set())
+    for record in result.records:
+        np.testing.assert_allclose(record.force, force(0.5), atol=1e-2)
+
+
+@pytest.mark.parametrize("names", [("{}_raw", "{}_processed"), ("{} Roh", "{} korrigiert")])
+def test_raw_and_processed_samples_of_a_test_are_no_two_tests(tmp_path, names):
+    for name, factor in zip(names, (1.0, 1.2), strict=True):
+        rows = "".join(f"{t:.3f},{x:.7f},{f:.6f}\n" for t, x, f in zip(T, X, factor * force(0.5), strict=True))
+        (tmp_path / f"{name.format('x1_0.5A')}.csv").write_text("time [s],displacement [mm],force [N]\n" + rows)
+    first, second = import_files([tmp_path]).refusals
+    assert {first.error.code, second.error.code} == {"E_CONDITIONS"}
+    profile = re.search(r"\[file\] leave_out = \S+", str(first.error))[0].replace("] ", "]\n")
+    (record,) = import_files([tmp_path], parse_profile(profile)).records
+    assert record.id == first.run or Path(first.file).stem.replace(" ", "_") == record.id
 
 
 def test_fields_and_a_description_of_a_data_package(tmp_path):

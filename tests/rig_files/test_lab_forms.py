@@ -303,7 +303,8 @@ def test_a_profile_integrates_a_velocity(tmp_path):
     ("heading", "factor", "code"),
     [
         ("Amplitude: 10 mm", 1 / 5, "W_NAME"), ("Amplitude: 10 mm", 1.0, ""), ("Stroke: 20 mm", 1.0, ""),
-        ("Amplitude: 10 mm", 10, "E_MOTION_CONTRADICTS"), ("Stroke: 20 mm", 25.4, "E_MOTION_CONTRADICTS"),
+        ("Amplitude: 10 mm", 10, "E_MOTION_CONTRADICTS"), ("target amplitude: 10 mm, 1 Hz", 10, "E_MOTION_CONTRADICTS"),
+        ("Stroke: 20 mm", 25.4, "E_MOTION_CONTRADICTS"),
         ("Stroke: 100 mm", 1.0, "W_NAME"), ("Length 254 mm", 1.0, ""),
     ],
 )  # fmt: skip
@@ -325,6 +326,15 @@ def test_a_frequency_with_a_decimal_comma_in_a_heading_is_compared(tmp_path):
     first = import_files([tmp_path]).records[0]
     assert first.id == "a_I_=_0.5_A_f_=_2.5_Hz"
     assert ["states 2.5 Hz and the record has" in f.text for f in first.findings if f.code == "W_NAME"] == [True]
+
+
+@pytest.mark.parametrize(("others", "codes"), [(10, {"W_NAME"}), (12, set())])
+def test_an_amplitude_that_only_one_test_of_a_frequency_does_not_reach_is_reported(tmp_path, others, codes):
+    for i, stated in enumerate((others, others, others, 15)):
+        head = f"Amplitude: {stated} mm\nTime (s),Displacement (mm),Force (N)\n"
+        (tmp_path / f"t{i}_{i / 2}A.csv").write_text(head + rows(T, X, force(i / 2)))
+    found = [{f.code for f in record.findings} & {"W_NAME"} for record in import_files([tmp_path]).records]
+    assert found == [set(), set(), set(), codes]
 
 
 @pytest.mark.parametrize("stated", [10, 20])

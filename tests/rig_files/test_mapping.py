@@ -277,6 +277,9 @@ def test_what_a_changing_current_does_to_the_force_is_no_fault_of_the_rig():
     findings = check_record(Record("a", t, x, force, current=current)).findings
     assert [finding.code for finding in findings] == ["W_CURRENT_VARIES"]
     assert "export each level as a test" in findings[0].text
+    for name, told in (("a_3A", True), ("a_1A", False)):
+        (finding,) = check_record(Record(name, t, x, force, current=current)).findings
+        assert ("its name states 3 A: check that the channel is the coil's current" in finding.text) == told
 
 
 def test_rows_that_begin_with_a_word_are_all_read(tmp_path):

@@ -255,6 +255,28 @@ def test_all_units_that_lack_are_asked_for_at_once_and_those_of_a_column_that_is
     np.testing.assert_allclose(record.time, rows()[:, 0])
 
 
+def test_the_profile_that_is_written_leaves_a_unit_open_of_which_two_are_stated(tmp_path):
+    path = write(tmp_path, "a_0.5A.csv", text(rows(), ("time [s],disp [mm],Force [kN]", "s,mm,N")))
+    with pytest.raises(InputError, match="E_AMBIGUOUS"):
+        read_run(path)
+    guess = profile_text(guess_profile(path))
+    with pytest.raises(InputError, match="E_AMBIGUOUS"):
+        read_run(path, parse_profile(guess))
+    record = read_run(path, parse_profile(guess.replace("[channels.force]", '[channels.force]\nunit = "N"')))
+    np.testing.assert_allclose(record.force, rows()[:, 2], atol=1e-5)
+
+
+def test_what_a_profile_states_against_a_heading_or_a_time_column_is_said_or_refused(tmp_path):
+    path = write(tmp_path, "a_0.5A.csv", text(rows(), ("time [s],disp [mm],force [N]",)))
+    record = read_run(path, parse_profile('[channels.force]\nunit = "N"\nscale = 2.0'))
+    assert any("'force [N]' has the unit N, and is multiplied by 2" in finding.text for finding in record.findings)
+    rate = 1 / (rows()[1, 0] - rows()[0, 0])
+    profile = '[file]\nsample_rate_Hz = {}\n[channels.time]\ncolumn = "time [s]"\n'
+    with pytest.raises(InputError, match=r"leave sample_rate_Hz or \[channels.time\] out of the profile"):
+        read_run(path, parse_profile(profile.format(2 * rate)))
+    assert read_run(path, parse_profile(profile.format(rate))).time.size == record.time.size
+
+
 def test_the_profile_of_columns_that_the_samples_decide_on_names_those_of_the_file(tmp_path):
     samples = np.random.default_rng(1).normal(0, 0.02, 600)  # of an actuator at rest
     header = ("time [s],Axial displacement [mm],force [N],Vertical displacement [mm]",)

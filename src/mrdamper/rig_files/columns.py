@@ -163,10 +163,15 @@ def noted_columns(table: RawTable, profile: Profile, assigned: Mapping[str, Assi
     for role, reason in _left_out(table, profile, columns).items():
         yield Finding("W_COLUMN", f"the {role} channel is not used: {reason}")
     for role, own in columns.items():
-        header, stated = table.headers[own], profile.channel(role).unit or ""
-        unit = parse_unit(stated)
+        header, channel = table.headers[own], profile.channel(role)
+        unit, title = parse_unit(channel.unit or ""), table.title(own)
         if unit and header.known and unit.dimension == header.dimension and unit != header.known:
-            text = f"{table.title(own)!r} is read in {stated}, as the profile states, not in its own {header.unit}"
+            text = f"{title!r} is read in {channel.unit}, as the profile states, not in its own {header.unit}"
+            yield Finding("W_CHOSEN", text)
+        if channel.scale not in (None, 1.0) and header.dimension == DIMENSION[role]:
+            text = (
+                f"{title!r} has the unit {header.unit}, and is multiplied by {channel.scale:g}, as the profile states"
+            )
             yield Finding("W_CHOSEN", text)
 
 
@@ -209,8 +214,10 @@ def propose(table: RawTable) -> dict[str, tuple[int | None, str]]:
     proposed: dict[str, tuple[int | None, str]] = dict.fromkeys(REQUIRED, (None, ""))
     for role, i in _columns(table, Profile())[0].items():
         header = table.headers[i]
-        with contextlib.suppress(RigFileError):  # two columns of its name differ
+        with contextlib.suppress(RigFileError):  # two columns of its name differ, or two units are stated
             _refuse_two_values(table, role, i, Profile())
+            proposed[role] = i, ""
+            _refuse_two_units(table, role, i, header.unit)
             proposed[role] = i, header.unit if header.dimension == DIMENSION[role] else ""
     return proposed
 
@@ -416,8 +423,13 @@ def _unit_problem(table: RawTable, role: str, column: int, unit: str) -> UnitErr
 def units_in(line: str, names: Collection[str] = ()) -> list[tuple[str, str]]:
     """Return the channels of which a line states the unit and nothing else, and the units: the force column is in N.
 
-    A letter stands for a channel only if it is one of some names of columns.
+    A letter stands for a channel only if it is one of some names of columns. Behind such a name other texts may stand:
+    x; displacement; cm; LVDT.
     """
+    name, *others = (cell.strip() for cell in line.split("; "))
+    if name.casefold() in names and (role := column_names.role_of(name)) and sum(map(is_unit, others)) == 1:
+        unit = next(filter(is_unit, others))
+        return [(role, unit)] if split_name("", unit).dimension == DIMENSION[role] else []
     line = re.sub(r"\(([^()]*)\)", lambda aside: aside[0] if is_unit(aside[1]) else "", line)
     return [stated for sentence in line.split(". ") for stated in _units_in_sentence(sentence, names)]
 
@@ -444,9 +456,6 @@ def _refuse_two_units(table: RawTable, role: str, column: int, unit: str) -> Non
     other = parse_unit(unit)
     names = {header.name.casefold() for header in table.headers}
     lines = {of: line.strip() for line in table.lines for its, of in units_in(line, names) if its == role}
-    own = table.headers[column].name.casefold()
-    for line in [line for line in table.lines if line.partition(";")[0].casefold() == own]:  # x; displacement; cm; LVDT
-        lines |= {of: line for cell in line.split(";") if (of := cell.strip()) and is_unit(of)}
     stated = {of: f"the line {line[:80]!r}" for of, line in lines.items()}
     same = any(parse_unit(of) == other for of in stated)  # what else is stated may be that of other files
     if inner is not None and inner.dimension == DIMENSION[role]:

@@ -88,12 +88,18 @@ def refuse_two_rates(table: RawTable, profile: Profile, time: Floats, displaceme
     An export of every n-th sample has a lower rate than it was recorded at: it is taken where the frequency that
     is stated is that of the time column, or where the profile names this column and no frequency contradicts it.
     """
-    stated = _rate_beside(table)
+    rate = profile.file.sample_rate_Hz if profile.channel("time").column is not None else None
+    stated = rate or _rate_beside(table)
     time, displacement = time[:_SAMPLES], displacement[:_SAMPLES]
     steps = np.diff(time[np.isfinite(time)])
     step = float(np.median(steps)) if steps.size else 0.0
     if not stated or step <= 0 or abs(stated * step - 1) <= _SAME_RATE or abs(1 / (stated * step) - 1) <= _SAME_RATE:
         return
+    if rate:
+        problem = (
+            f"the profile gives sample_rate_Hz = {rate:g} and a time column that has {number(1 / step)} per second"
+        )
+        raise table.source.refuse("E_AMBIGUOUS", problem, "leave sample_rate_Hz or [channels.time] out of the profile")
     frequencies, measured = {*stated_frequencies(table)} - {stated}, frequency_of(time, displacement)
     near = [abs(measured / f - 1) <= _SAME_FREQUENCY for f in frequencies if f > 0] if measured else []
     if any(near) or (profile.channel("time").column is not None and not near):

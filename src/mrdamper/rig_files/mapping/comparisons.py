@@ -12,7 +12,8 @@ from mrdamper.data import Floats, held_current
 from mrdamper.data.arrays import take
 from mrdamper.errors import QualityError
 from mrdamper.rig_files.coil_current import with_stated_current
-from mrdamper.rig_files.column_names import TABLES
+from mrdamper.rig_files.column_names import COMPUTED, TABLES, words, words_of
+from mrdamper.rig_files.profile import toml
 from mrdamper.rig_files.quality.motion import stated_motion
 from mrdamper.rig_files.quality.view import find_strokes
 from mrdamper.rig_files.record import Finding, Record
@@ -22,6 +23,7 @@ _ALIKE_A = 0.03  # difference of the current within which two tests have the sam
 _FEWEST_AGREEING = 3  # tests of the amplitude that they state, for every one of half of it
 _SEVERAL = 2.0  # ratio of peak-to-peak forces at equal conditions that no repetition explains
 _UNITS = {unit: TABLES["units"]["force"][unit] for unit in ("lbf", "kgf", "kN")}
+_OF_VERSIONS = COMPUTED | words("raw") | words("processed")
 _ROUNDING = 1e-3  # of the largest value: two exports of one test differ by less, two tests by more
 _ROUNDING_A = 5.5e-3  # [A] so much a current of two decimals differs from one of more
 MOST_SAMPLES = 20_000
@@ -44,7 +46,8 @@ def forces_grow(stated: Sequence[tuple[Record, float]], *, repeated: bool = Fals
 def contradictions(records: Sequence[Record]) -> dict[int, QualityError]:
     """Return the tests that contradict each other, by their place, and the refusal of each.
 
-    Equal conditions whose forces differ several-fold; and the same samples under several currents.
+    Equal conditions whose forces differ several-fold; the same samples under several currents; and raw and processed
+    samples of one test.
     """
     points = {i: point for i, record in enumerate(records) if (point := _point(record)) is not None}
     refused = _copies(records, points)
@@ -57,21 +60,31 @@ def contradictions(records: Sequence[Record]) -> dict[int, QualityError]:
         if near and max(force, other_force) > _SEVERAL * min(force, other_force):
             refused.setdefault(i, _refusal(records[i], points[i], records[j], points[j]))
             refused.setdefault(j, _refusal(records[j], points[j], records[i], points[i]))
+        elif near and _are_versions(records[i], records[j]):
+            refused.setdefault(i, _refusal_of_version(records[i], records[j]))
+            refused.setdefault(j, _refusal_of_version(records[j], records[i]))
     return refused
 
 
 def stated_as_amplitudes(records: Sequence[Record]) -> dict[int, Finding]:
-    """Return, by their place, tests of half the amplitude that their name states, where names state no strokes."""
+    """Return, by their place, tests of another amplitude than their name states, where most have the one of theirs.
+
+    Half of it is compared with all tests, which may state strokes; any other with those of the same frequency.
+    """
     stated = {i: length for i, record in enumerate(records) if (length := stated_motion(record, "mm")) is not None}
     points = {i: point for i in stated if (point := _point(records[i])) is not None}
-    halves = {i for i, point in points.items() if abs(2e3 * point[1] / stated[i] - 1) < _ALIKE}
-    agreeing = sum(abs(1e3 * point[1] / stated[i] - 1) < _ALIKE for i, point in points.items())
-    if agreeing < _FEWEST_AGREEING * len(halves):
-        return {}
-    text = "the name or heading states {:g} mm and the record has an amplitude of {:.3g} mm"
-    rest = f"where {agreeing} other tests have what theirs state: check the unit of displacement, or the name"
-    texts = {i: text.format(stated[i], 1e3 * points[i][1]) for i in halves}
-    return {i: Finding("W_NAME", f"{text}, {rest}") for i, text in texts.items()}
+    ratios = {i: 1e3 * point[1] / stated[i] for i, point in points.items()}
+    named = {i for i, record in enumerate(records) if any(finding.code == "W_NAME" for finding in record.findings)}
+    findings = dict[int, Finding]()
+    for i in [i for i, ratio in ratios.items() if abs(ratio - 1) > 2 * _ALIKE and i not in named]:
+        half = abs(2 * ratios[i] - 1) < _ALIKE
+        beside = [r for j, r in ratios.items() if half or abs(points[j][0] - points[i][0]) <= _ALIKE * points[i][0]]
+        agreeing, odd = (sum((abs(r - 1) < _ALIKE) == same for r in beside) for same in (True, False))
+        if agreeing >= _FEWEST_AGREEING * odd:
+            size = f"{stated[i]:g} mm and the record has an amplitude of {1e3 * points[i][1]:.3g} mm"
+            rest = f"where {agreeing} other tests have what theirs state: check the unit of displacement, or the name"
+            findings[i] = Finding("W_NAME", f"the name or heading states {size}, {rest}")
+    return findings
 
 
 def in_another_unit(records: Sequence[Record]) -> dict[int, Finding]:
@@ -143,6 +156,21 @@ def _same(one: Record, other: Record, with_current: bool) -> bool:
     same = same and alike(one.force, other.force) and alike(one.displacement, other.displacement)
     currents = (one.current, other.current) if with_current else ()
     return same and (not currents or alike(*currents, limit=_ROUNDING_A))  # type: ignore[arg-type]
+
+
+def _are_versions(one: Record, other: Record) -> bool:
+    """Tell if the names of two tests differ by words such as raw and processed only."""
+    bare, others = ([w for w in words_of(r.id) if w.casefold() not in _OF_VERSIONS] for r in (one, other))
+    return bare == others and words_of(one.id) != words_of(other.id)
+
+
+def _refusal_of_version(record: Record, other: Record) -> QualityError:
+    problem = f"has the condition of {other.id}, and by their names they are versions of one test"
+    own = words_of(record.id)
+    pattern = next((f"*{word}*" for word in words_of(other.id) if word not in own), other.id)
+    remedy = f"keep one: [file] leave_out = {toml([pattern])} in a profile omits the other"
+    where = record.provenance.get("file", record.id)
+    return QualityError(problem, where=where, remedy=remedy, code="E_CONDITIONS")
 
 
 def _sampled(channel: Floats, size: int) -> Floats:

@@ -249,6 +249,7 @@ def with_stated_signs(table: RawTable) -> RawTable:
     about the sign leaves it unclear, as a clause does whose sense is none of the words known.
     """
     stated: dict[str, set[int]] = {}
+    of_both: set[int] = set()  # by lines that name no channel
     for whole in (line for line in table.lines if not any(factor < 0 for *_, factor in scales_in(line))):
         counted, clauses = senses_in(whole), _CLAUSE.split(whole)
         each = [clause for clause in clauses if _signs(_POLARITIES, clause)]
@@ -261,6 +262,9 @@ def with_stated_signs(table: RawTable) -> RawTable:
             general = others & _CONVENTION or others <= _IS | _SENSE_NAMES
             for role in named & {*SIGNED} or {""}:
                 stated.setdefault(role, set()).update(own if named or general or -1 not in own else {1, -1})
+            of_both |= set() if _named(whole) & {*SIGNED} else own
+    if {*SIGNED} <= {*stated} and len(of_both) == 1:  # there is no channel of which such a line could be alone
+        stated = {role: own | of_both for role, own in stated.items()}
     unnamed = stated.get("", set()) - {1} and stated[""]
     senses = {role: sum(own) for role in SIGNED if (own := stated.get(role) or unnamed)}
     text = "the file counts compression positive in the {}: its sign is changed unless a profile states it"

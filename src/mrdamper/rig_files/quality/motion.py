@@ -11,7 +11,7 @@ from mrdamper.data import Floats, held_current, once_per_run
 from mrdamper.data.arrays import take
 from mrdamper.data.wording import counted, number
 from mrdamper.physics.motion.sines import SINE_DISTORTION_LIMIT
-from mrdamper.rig_files.conditions import motions_in
+from mrdamper.rig_files.conditions import currents_in, motions_in
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding, Record
 
@@ -28,6 +28,7 @@ FEWEST_LEVELS, _MANY = 16, 8  # values of a channel, and samples for each
 _SAME_FREQUENCY = 0.2  # relative difference of what is measured
 # Measured amplitude over the one stated, which may be the stroke peak to peak: a machine falls short of its command.
 _AMPLITUDES = (0.25, 1.6)
+_SHARE = 0.1  # of the samples, at the current that a name states
 _HEATING = 0.2  # of the current at most, by which a heated coil lowers it in a test
 _UNITS = np.array([2.54, 10, 25.4, 39.37, 100, 1000])  # factors between units of length
 _SAME_FACTOR = 0.015  # relative difference from it: 2.5 and 25 are none
@@ -130,7 +131,11 @@ def change_of(record: Record, window: tuple[float, float] | None) -> Iterator[Fi
     change = held_in(record, window)[1]
     if change:
         use = "a global model uses the run; to identify it alone, hold the current, or export each level as a test"
-        yield Finding("W_CURRENT_VARIES", f"{change}: {use}")
+        named = [of for of in currents_in(record.id) if np.mean(np.isclose(record.current, of, 0.05, 0.02)) < _SHARE]
+        other = "".join(
+            f" (its name states {of:g} A: check that the channel is the coil's current)" for of in named[:1]
+        )
+        yield Finding("W_CURRENT_VARIES", f"{change}{other}: {use}")
 
 
 @once_per_run
