@@ -129,7 +129,7 @@ def changes(view: View) -> Iterator[Finding]:
 def change_of(record: Record, window: tuple[float, float] | None) -> Iterator[Finding]:
     """Yield the finding that a record's current changes within a window of time."""
     change = held_in(record, window)[1]
-    if change:
+    if change and record.current is not None:
         use = "a global model uses the run; to identify it alone, hold the current, or export each level as a test"
         named = [of for of in currents_in(record.id) if np.mean(np.isclose(record.current, of, 0.05, 0.02)) < _SHARE]
         other = "".join(
