@@ -165,6 +165,10 @@ def test_a_joint_fit_is_made_of_forms_without_rates_but_for_the_shape(monkeypatc
         shape, conditions, model_type = "yield_displacement", tuple(CONDITIONS), BoucWen
         linear = ("c", "yield_force", "k1", "k3", "f0", "m")
 
+        def only(self, rows):
+            asked.update(rows=rows)
+            return "part"
+
     def chosen(data, candidates, shapes, dissipating):
         asked.update(candidates=candidates, shapes=shapes, dissipating=dissipating)
         forms, fit = dict.fromkeys(functions, Law("constant")), SimpleNamespace(parameters=parameters, at_bounds=("c",))
@@ -176,18 +180,10 @@ def test_a_joint_fit_is_made_of_forms_without_rates_but_for_the_shape(monkeypatc
 
     monkeypatch.setattr(modified, "_condensed", condensed)
     monkeypatch.setattr(modified, "choose_forms", chosen)
-
-    def fitted(data, forms, starts, kept):
-        asked.setdefault("kept", []).extend(np.flatnonzero(each).tolist() for each in kept)
-        return [SimpleNamespace(parameters=parameters) for _ in kept]
-
-    monkeypatch.setattr(modified, "fit_jointly", fitted)
+    monkeypatch.setattr(modified, "fit_jointly", lambda part, forms, start: SimpleNamespace(parameters=parameters))
     rows = SimpleNamespace(of=lambda c: SimpleNamespace(condition=c, sine=c))
     monkeypatch.setattr(modified, "RunRows", rows)
-    everything, fold = range(len(CONDITIONS)), [1, 2]
-    fit, refit = modified.fit_modified_jointly(
-        tuple(CONDITIONS), identified(by_the_papers_laws), {"a": "b"}, folds=lambda: [fold, fold, everything]
-    )
+    fit, refit = modified.fit_modified_jointly(tuple(CONDITIONS), identified(by_the_papers_laws), {"a": "b"})
     lengths = [by_the_papers_laws(c).yield_displacement for c in CONDITIONS]
     assert (asked["runs"], asked["cls"], asked["more"]) == (tuple(CONDITIONS), BoucWen, ("m",))
     assert asked["dissipating"]["yield_force"] == "N"
@@ -205,9 +201,7 @@ def test_a_joint_fit_is_made_of_forms_without_rates_but_for_the_shape(monkeypatc
     assert (fit.conditions, fit.at_bounds) == (tuple(CONDITIONS), ("c",))
     assert (fit.damper.rig, fit.damper.provenance["a"], set(fit.functions)) == ("bench", "b", set(functions))
     again = refit([0, 5])
-    others = [i for i in everything if i not in fold]
-    assert refit(others).functions == functions
-    assert (asked["kept"], again.envelope) == ([others, others, [0, 5]], Envelope.of([CONDITIONS[0], CONDITIONS[5]]))
+    assert (asked["rows"], again.envelope) == ([0, 5], Envelope.of([CONDITIONS[0], CONDITIONS[5]]))
 
 
 @pytest.mark.parametrize("any_motion", [True, False])

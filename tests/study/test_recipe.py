@@ -270,11 +270,9 @@ def test_joint_fits_of_functions_follow_the_motion_or_the_current_alone(monkeypa
     monkeypatch.setattr(
         recipes, "fit_modified_jointly", lambda *given, **named: asked.append((given, named)) or (fit, "refit")
     )
-    monkeypatch.setattr(recipes, "all_folds", lambda runs: [f"fold of {runs}"])
     made_ = recipes.fit_functions_jointly("ab", identifications, *way)
     assert (made_.damper, made_.refit, made_.fit) == ("damper", "refit", fit)
     about = {"method": "balance", "identification runs": "2", "functions": (*way, "global fit")[0]}
-    assert asked[0][1].pop("folds")() == ["fold of ab"]
     assert asked == [(("ab", identifications, about), {"any_motion": any_motion})]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -56,17 +56,29 @@ class Condensed:
         """Runs that each fold omits in the choice of forms, by kind of fold."""
         return fold_groups(self.conditions)
 
+    def only(self, rows: Sequence[int]) -> Condensed:
+        """Return the same for some of the runs."""
+        index = list(rows)
+        return replace(
+            self,
+            run_ids=tuple(self.run_ids[i] for i in index),
+            conditions=tuple(self.conditions[i] for i in index),
+            scale=self.scale[index],
+            gram=self.gram[index],
+            bend=self.bend[index],
+        )
+
     def at(self, shape_values: Floats) -> tuple[Floats, Floats]:
         """Gram matrices at one shape value a run, and their slopes by its logarithm, on the spline through the ladder.
 
-        Both (..., R, L+1, L+1), of shape values (..., R).
+        Both (R, L+1, L+1).
         """
         logs = np.log(self.ladder)
         u = np.minimum(np.maximum((np.log(shape_values) - logs[0]) / (logs[1] - logs[0]), 0), logs.size - 1)
         first = np.minimum(u.astype(int), logs.size - 2)
-        weights = ((u - first)[..., None] ** np.arange(4) @ _SPLINE).reshape(*u.shape, 2, 4) / 6
-        both = (weights @ self._cells[np.arange(u.shape[-1]), first]).reshape(*u.shape, 2, *self.gram.shape[2:])
-        return both[..., 0, :, :], both[..., 1, :, :] / (logs[1] - logs[0])
+        weights = ((u - first)[:, None] ** np.arange(4) @ _SPLINE).reshape(-1, 2, 4) / 6
+        both = (weights @ self._cells[np.arange(u.size), first]).reshape(u.size, 2, *self.gram.shape[2:])
+        return both[:, 0], both[:, 1] / (logs[1] - logs[0])
 
     @cached_property
     def _cells(self) -> Floats:

@@ -7,13 +7,12 @@ each form selected by cross-validation over conditions.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mrdamper.dampers.base import Damper, Saved, not_held
 from mrdamper.dampers.condensed_runs import Condensed, condense
@@ -229,14 +228,13 @@ def fit_modified_jointly(
     provenance: Mapping[str, str] | None = None,
     *,
     any_motion: bool = True,
-    folds: Callable[[], Iterable[Sequence[int]]] = tuple,
 ) -> tuple[ModifiedFit, Callable[[Sequence[int]], ModifiedModel]]:
     """Fit all parameter functions to the forces of all runs at once.
 
     The identifications are of these runs, in this order: the start of the shape coordinate. Functions of frequency and
     amplitude are tried, too, if `any_motion`; otherwise laws over the current only. Returns the fit, and a function
-    that fits the model to the runs of some indices only, with the same forms; fits without each of `folds` are made at
-    once. Raises `IdentificationError` if the model has more than one shape coordinate, or there are too few runs.
+    that fits the model to the runs of some indices only, with the same forms. Raises `IdentificationError` if the model
+    has more than one shape coordinate, or there are too few runs.
     """
     model_type = type(identifications[0].model)
     conditions = [i.condition for i in identifications]
@@ -255,19 +253,8 @@ def fit_modified_jointly(
         rig, envelope = identifications[0].rig, envelope_of([parts[i] for i in rows])
         return ModifiedModel(held, rig=rig, envelope=envelope, provenance=dict(about))
 
-    @cache
-    def all_refits() -> dict[tuple[int, ...], ParameterMap]:
-        omitted = [np.isin(np.arange(len(runs)), fold) for fold in folds()]
-        return refits([one for one in omitted if not one.all()])
-
-    def refits(omitted: Sequence[NDArray[np.bool_]]) -> dict[tuple[int, ...], ParameterMap]:
-        fits = fit_jointly(data, [forms], [start], ~np.array(omitted)) if omitted else []
-        return {tuple(np.flatnonzero(~one).tolist()): fit.parameters for one, fit in zip(omitted, fits, strict=True)}
-
     def refit(rows: Sequence[int]) -> ModifiedModel:
-        key = tuple(sorted(rows))
-        fitted = all_refits() if key in all_refits() else refits([~np.isin(np.arange(len(runs)), rows)])
-        return model(rows, fitted[key])
+        return model(rows, fit_jointly(data.only(rows), forms, start).parameters)
 
     functions = joint.parameters.functions
     values = {name: np.array([_coordinate(i, name) for i in identifications]) for name in functions}

@@ -10,14 +10,14 @@ a run from a drifting session then has less weight (iteratively reweighted least
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache
-from itertools import islice, product
+from functools import lru_cache
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mrdamper.dampers.condensed_runs import GRID_RATIO, Condensed
 from mrdamper.dampers.parameter_map import ParameterMap
@@ -26,8 +26,14 @@ from mrdamper.errors import IdentificationError
 from mrdamper.statistics.functions.fitting import fit_function, require_determined
 from mrdamper.statistics.functions.forms import FORMS, Form, ParameterFunction, features
 from mrdamper.statistics.functions.selection import broken_law, rises, smaller_wins, supported
-from mrdamper.statistics.linear import inverse_of_triangle, on_one_blas_thread, robust_weights, solve_weighted
-from mrdamper.statistics.stacked_least_squares import Products, least_squares_of_each, newton_refine_each, solve_each
+from mrdamper.statistics.levenberg_marquardt import least_squares, newton_refine
+from mrdamper.statistics.linear import (
+    on_one_blas_thread,
+    products_of_rest,
+    robust_weights,
+    solve_linear,
+    solve_weighted,
+)
 
 _SEARCH_TOLERANCE = 1e-6  # relative gain of a step at which a search ends
 _WEIGHT_TOLERANCE = 1e-3  # change of the robust weights below which the rounds end
@@ -81,51 +87,43 @@ class JointFunctionFit:
 @on_one_blas_thread
 def fit_jointly(
     data: Condensed,
-    forms: Sequence[Mapping[str, Law]],
-    starts: Sequence[ParameterFunction | None],
-    kept: NDArray[np.bool_],
+    forms: Mapping[str, Law],
+    start: ParameterFunction | None,
     *,
     reweightings: int = 6,
     most_steps: int = 12,
     polish: bool = True,
-) -> list[JointFunctionFit]:
-    """Fit the coefficients of all parameter functions to all runs, with some form of each coordinate: B fits at once.
+) -> JointFunctionFit:
+    """Fit the coefficients of all parameter functions to all runs at once, with some form of each coordinate.
 
-    They are of several forms and starts, or of several sets of the runs: `forms` and `starts` are B, or one for all;
-    `kept` (B, R) marks the runs of each fit. A start is a function of the shape coordinate, whose form and rates are
-    used; None for models without one. `reweightings` and `most_steps` are the rounds of robust weights and the steps of
-    the search in each. `polish`: refine to the last digits at the end, so that results do not depend on rounding.
+    `start` is the function of the shape coordinate to start from; its form and rates are used. It is None for models
+    without one. `reweightings` and `most_steps` are the rounds of robust weights and the steps of the search in each.
+    `polish`: refine to the last digits at the end, so that results do not depend on rounding.
     """
     design = _Design(data, forms)
-    if not data.shape:
-        solution = _reweighted(design, data.gram[:, 0], kept, reweightings)
-        return [_finish(design, solution, k, {}) for k in range(len(kept))]
-    search = _ShapeSearch(design, [start for start in starts if start], kept)
-    centre = search.start
-    box, rows = (centre - _SEARCH_RANGE, centre + _SEARCH_RANGE), np.arange(len(kept))
-    for left in range(reweightings - 1, -1, -1):
-        centre[rows] = least_squares_of_each(
-            search, rows, centre[rows], box[0][rows], box[1][rows], most_steps, _SEARCH_TOLERANCE
-        )
-        weights = kept[rows] * robust_weights(search.at(rows, centre[rows]).solution.nrmse_pp, _MIN_ERROR_PP)
-        change = np.abs(weights / np.where(kept[rows], search.weights[rows], 1.0) - kept[rows])
-        unsettled = np.max(change, axis=1) >= _WEIGHT_TOLERANCE
-        rows = rows[unsettled]
-        if not left or not rows.size:
+    if start is None:
+        return _finish(design, _reweighted(design, data.gram[:, 0], reweightings), {})
+    search = _ShapeSearch(design, start, np.ones(data.scale.size))
+    centre = np.array(start.coefficients) * search.scale
+    box = centre - _SEARCH_RANGE, centre + _SEARCH_RANGE
+    last = search
+    for _ in range(reweightings):
+        centre = least_squares(
+            search.residual, centre, *box, most_steps, _SEARCH_TOLERANCE, products=search.products, curved=True
+        ).point
+        weights = robust_weights(search.solution(centre).nrmse_pp, _MIN_ERROR_PP)
+        settled = np.max(np.abs(weights / search.weights - 1)) < _WEIGHT_TOLERANCE
+        last, search = search, search.weighted(weights)
+        if settled:
             break
-        search.weights[rows] = weights[unsettled]
     if polish:
-        centre = newton_refine_each(search, centre, *box)
-    at, ends, fits = search.at(np.arange(len(kept)), centre), data.ladder[[0, -1]], list[JointFunctionFit]()
-    reached = np.exp(at.logs)
-    outside = (reached <= ends[0] * GRID_RATIO**0.01) | (reached >= ends[1] / GRID_RATIO**0.01)
-    for k, (point, at_end) in enumerate(zip(centre / search.scale, np.any(outside & kept, axis=1), strict=True)):
-        start = search.starts[k if len(starts) > 1 else 0]
-        coefficients = tuple(point[: len(start.coefficients)].tolist())
-        function = ParameterFunction(start.form, coefficients, start.rates, log=True)
-        fit = _finish(design, at.solution, k, {data.shape: function})
-        fits.append(replace(fit, at_bounds=(data.shape,)) if at_end else fit)
-    return fits
+        centre = newton_refine(last.gradient, centre, *box)
+    solution = last.solution(centre)
+    function = ParameterFunction(start.form, tuple((centre / search.scale).tolist()), start.rates, log=True)
+    fit = _finish(design, solution, {data.shape: function})
+    reached, ends = search.shape_values(centre), data.ladder[[0, -1]]
+    outside = np.any((reached <= ends[0] * GRID_RATIO**0.01) | (reached >= ends[1] / GRID_RATIO**0.01))
+    return replace(fit, at_bounds=(data.shape,)) if outside else fit
 
 
 @on_one_blas_thread
@@ -134,167 +132,161 @@ def leave_out_errors(data: Condensed, fit: JointFunctionFit, forms: Mapping[str,
 
     The shape function is that of the fit to all runs: fast enough to select forms, but no final score.
     """
-    design = _Design(data, [forms])
+    design = _Design(data, forms)
     shapes = (
         fit.parameters.functions[data.shape](*features(data.conditions))
         if data.shape
         else np.full(data.scale.size, data.ladder[0])
     )
     table, _ = design.table(data.at(shapes)[0])
-    rows, weights = table.reshape(-1, table.shape[-1]), robust_weights(fit.nrmse_pp, _MIN_ERROR_PP)
+    rows, weights = table.reshape(-1, table.shape[2]), robust_weights(fit.nrmse_pp, _MIN_ERROR_PP)
     errors: dict[str, Floats] = {}
     for kind, groups in data.folds.items():
         kept = np.tile(weights, (len(groups), 1))
         for fold, group in zip(kept, groups, strict=True):
             fold[group] = 0.0
-        solutions = solve_weighted(rows[:, :-1], rows[:, -1], np.repeat(kept, table.shape[-2], axis=1), _RANK_LIMIT)
-        nrmse_pp = _Solution.of(table, solutions).nrmse_pp
-        errors[kind] = np.concatenate([of[group] for of, group in zip(nrmse_pp, groups, strict=True)])
+        solutions = solve_weighted(rows[:, :-1], rows[:, -1], np.repeat(kept, table.shape[1], axis=1), _RANK_LIMIT)
+        left_out = [_Solution.of(table[group], solution) for group, solution in zip(groups, solutions, strict=True)]
+        errors[kind] = np.concatenate([solution.nrmse_pp for solution in left_out])
     return errors
 
 
 @dataclass(frozen=True)
 class _Solution:
-    coefficients: Floats  # (B, P)
-    error: Floats  # (B, R, L+1)
+    coefficients: Floats
+    error: Floats  # (R, L+1)
 
     @classmethod
     def of(cls, table: Floats, coefficients: Floats) -> _Solution:
-        """Errors of tables (R, L+1, P+1), or (B, R, L+1, P+1), with coefficients (B, P)."""
-        rows = table.reshape(*table.shape[:-3], -1, table.shape[-1])
-        error = (rows[..., :-1] @ coefficients[:, :, None])[..., 0] - rows[..., -1]
-        return cls(coefficients, error.reshape(len(error), *table.shape[-3:-1]))
+        return cls(coefficients, table[:, :, :-1] @ coefficients - table[:, :, -1])
 
     @property
     def nrmse_pp(self) -> Floats:
-        return np.sqrt(np.sum(self.error**2, axis=-1))
+        return np.sqrt(np.sum(self.error**2, axis=1))
 
 
 class _Design:
-    """Linear coordinates of every run as a matrix times the coefficients of all functions, for each set of forms."""
+    """Linear coordinates of every run as a matrix times the coefficients of all functions."""
 
-    def __init__(self, data: Condensed, forms: Sequence[Mapping[str, Law]]):
+    def __init__(self, data: Condensed, forms: Mapping[str, Law]):
         self.data = data
-        self.forms = [{name: each[name] for name in data.linear} for each in forms]
-        point, runs = features(data.conditions), data.scale.size
-        blocks = [[law.form.columns(*point, law.rates) for law in each.values()] for each in self.forms]
-        width = max(sum(block.shape[1] for block in each) for each in blocks)
-        self.matrix = np.zeros((len(forms), runs, len(data.linear) + 1, width + 1))
-        for matrix, each in zip(self.matrix, blocks, strict=True):
-            at = 0
-            for row, block in enumerate(each):
-                # The Gram matrices hold forces over each run's peak-to-peak value.
-                matrix[:, row, at : at + block.shape[1]] = block / data.scale[:, None]
-                at += block.shape[1]
-        self.matrix[..., -1, -1] = 1.0
-        self.ridge = _RIDGE * np.eye(len(data.linear) + 1)
+        self.forms = {name: forms[name].form for name in data.linear}
+        self.rates = {name: forms[name].rates for name in data.linear}
+        point = features(data.conditions)
+        blocks = [form.columns(*point, self.rates[n]) for n, form in self.forms.items()]
+        self.sizes = [block.shape[1] for block in blocks]
+        runs, total = data.scale.size, sum(self.sizes)
+        self.matrix = np.zeros((runs, len(blocks) + 1, total + 1))
+        at = 0
+        for row, block in enumerate(blocks):
+            # The Gram matrices hold forces over each run's peak-to-peak value.
+            self.matrix[:, row, at : at + block.shape[1]] = block / data.scale[:, None]
+            at += block.shape[1]
+        self.matrix[:, -1, -1] = 1.0
+        self.ridge = _RIDGE * np.eye(len(blocks) + 1)
+        self.upper = np.triu(np.ones_like(self.ridge)) - np.eye(len(blocks) + 1) / 2
 
-    def table(self, gram: Floats, rows: NDArray[np.intp] | slice = slice(None)) -> tuple[Floats, Floats]:
-        """Rows that represent a run's samples, and the factors of their Gram matrices, of the fits at some indices.
+    def table(self, gram: Floats) -> tuple[Floats, Floats]:
+        """Rows that represent a run's samples, and the factors of their Gram matrices.
 
-        (B, R, L+1, P+1), by coefficient and, last, the measured force; (B, R, L+1, L+1).
+        (R, L+1, P+1), by coefficient and, last, the measured force; (R, L+1, L+1).
         """
-        size = np.sqrt(np.maximum(gram.diagonal(0, -2, -1), 1e-300))
-        factor = _factor(gram / (size[..., :, None] * size[..., None, :]) + self.ridge) * size[..., None, :]
-        return factor @ (self.matrix[rows] if len(self.matrix) > 1 else self.matrix), factor
+        size = np.sqrt(np.maximum(gram.diagonal(0, 1, 2), 1e-300))
+        factor = _factor(gram / (size[:, :, None] * size[:, None, :]) + self.ridge) * size[:, None, :]
+        return factor @ self.matrix, factor
 
 
 class _ShapeSearch:
-    """Weighted errors of B sets of runs over the coefficients of the shape function, all others solved for."""
+    """Weighted errors of all runs over the coefficients of the shape function, all others solved for."""
 
-    def __init__(self, design: _Design, starts: Sequence[ParameterFunction], kept: NDArray[np.bool_]):
-        data, self.design, self.starts, self.weights = design.data, design, starts, kept.astype(float)
-        width = max(len(start.coefficients) for start in starts)
-        columns, first = np.zeros((len(starts), data.scale.size, width)), np.zeros((len(starts), width))
-        for k, start in enumerate(starts):
-            size = len(start.coefficients)
-            columns[k, :, :size] = FORMS[start.form].columns(*features(data.conditions), start.rates)
-            first[k, :size] = start.coefficients
-        size = np.sqrt((self.weights[:, None, :] @ columns**2)[:, 0] / kept.sum(axis=1)[:, None])
+    def __init__(self, design: _Design, start: ParameterFunction, weights: Floats):
+        data, self.design, self.start, self.weights = design.data, design, start, weights
+        columns = FORMS[start.form].columns(*features(data.conditions), start.rates)
+        size = np.linalg.norm(columns, axis=0) / np.sqrt(columns.shape[0])
         self.scale = np.where(size > 0, size, 1.0)  # with runs at 0 A alone, a column over the current is zero
-        self.columns = columns / self.scale[:, None, :]  # (B, R, D)
-        self.start = first * self.scale
+        self.columns = columns / self.scale
+        self._tables: tuple[bytes, Floats, Floats, Floats] = b"", columns, columns, columns
+        self._solved: _Solution | None = None
         self.ends: tuple[float, float] = np.log(data.ladder[[0, -1]]).tolist()
 
-    def __call__(self, rows: NDArray[np.intp], u: Floats) -> tuple[Floats, Products]:
-        """Costs of some of the sets at a point each, and the function of their products."""
-        point = self.at(rows, u)
-        return np.sum((point.weights * point.solution.nrmse_pp) ** 2, axis=1), point.products
+    def weighted(self, weights: Floats) -> _ShapeSearch:
+        """Return the same with other weights, which do not change the cached tables."""
+        other = copy(self)
+        other.weights, other._solved = weights, None
+        return other
 
-    def at(self, rows: NDArray[np.intp], u: Floats) -> _ShapePoint:
-        """Evaluate some of the sets at a point each."""
-        low, high = self.ends
-        columns, weights = self.columns[rows], self.weights[rows]
-        logs = (columns @ u[:, :, None])[:, :, 0]
-        inside = np.minimum(np.maximum(logs, low), high)
-        gram, slope = self.design.data.at(np.exp(inside))
-        table, factor = self.design.table(gram, rows)
-        solution = _solve(table, weights)
-        return _ShapePoint(columns * (inside == logs)[:, :, None], weights, inside, slope, table, factor, solution)
+    def shape_values(self, u: Floats) -> Floats:
+        """(R,) values of the shape coordinate."""
+        return np.exp(np.minimum(np.maximum(self.columns @ u, self.ends[0]), self.ends[1]))
 
+    def solution(self, u: Floats) -> _Solution:
+        """Return the other functions' coefficients at a point."""
+        return self._at(u)[-1]
 
-class _ShapePoint(NamedTuple):
-    """Sets of runs at a point each."""
+    def residual(self, u: Floats) -> Floats:
+        return (self.weights[:, None] * self.solution(u).error).ravel()
 
-    columns: Floats  # (B, R, D) derivatives of the logarithm of the shape coordinate
-    weights: Floats  # (B, R)
-    logs: Floats  # (B, R) logarithm of the shape coordinate
-    slope: Floats  # (B, R, L+1, L+1) derivatives of the Gram matrices by it
-    table: Floats
-    factor: Floats
-    solution: _Solution
-
-    def products(self, some: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+    def products(self, u: Floats) -> tuple[Floats, Floats]:
         """Jᵀr and JᵀJ of the residual r and its derivatives J, the others moving along [Kaufman 1975, BIT 15, 49]."""
-        columns, weights, error = self.columns[some], self.weights[some], self.solution.error[some]
-        inverse = inverse_of_triangle(self.factor[some].swapaxes(-1, -2))
+        slopes = self._slopes(u)
+        columns = (self.weights[:, None, None] * self._at(u)[2][:, :, :-1]).reshape(len(slopes), -1)
+        return self.residual(u) @ slopes, products_of_rest(columns, slopes)
+
+    def _slopes(self, u: Floats) -> Floats:
+        """Return derivatives of the residual, the other coefficients held."""
+        slope, factor, _, solution = self._at(u)
+        inverse = np.linalg.inv(factor)
         # A triangle whose square moves by `slope` moves by the upper half of this, times itself.
-        moved = (inverse @ self.slope[some] @ inverse.swapaxes(-1, -2)) * _upper_half(inverse.shape[-1])
-        by_shape = (moved @ error[..., None]) * weights[:, :, None, None]
-        slopes = (by_shape * columns[:, :, None, :]).reshape(len(error), -1, columns.shape[2])
-        held = (weights[:, :, None, None] * self.table[some][..., :-1]).reshape(*slopes.shape[:2], -1)
-        residual = (weights[:, :, None] * error).reshape(len(error), 1, -1)
-        rest = slopes - held @ solve_each(held, slopes)
-        return (residual @ slopes)[:, 0], rest.transpose(0, 2, 1) @ rest
+        moved = (inverse.transpose(0, 2, 1) @ slope @ inverse) * self.design.upper
+        s, (low, high) = self.columns @ u, self.ends
+        by_shape = (moved @ solution.error[:, :, None])[:, :, 0] * (self.weights * ((s > low) & (s < high)))[:, None]
+        return (by_shape[:, :, None] * self.columns[:, None, :]).reshape(-1, u.size)
 
+    def gradient(self, u: Floats) -> Floats:
+        """Gradient of half the squared residual: exact, as the residual is stationary in the others."""
+        return self.residual(u) @ self._slopes(u)
 
-@cache
-def _upper_half(size: int) -> Floats:
-    """Factors of the elements of a matrix that leave half of its diagonal, and all above."""
-    return np.triu(np.ones((size, size))) - np.eye(size) / 2
+    def _at(self, u: Floats) -> tuple[Floats, Floats, Floats, _Solution]:
+        if self._tables[0] != u.tobytes():
+            gram, slope = self.design.data.at(self.shape_values(u))
+            table, factor = self.design.table(gram)
+            self._tables, self._solved = (u.tobytes(), slope, factor, table), None
+        if self._solved is None:
+            self._solved = _solve(self._tables[-1], self.weights)
+        return *self._tables[1:], self._solved
 
 
 def _solve(table: Floats, weights: Floats) -> _Solution:
-    """Coefficients of least weighted squares (B, P); errors are those of the condensed runs."""
-    weighted = (weights[:, :, None, None] * table).reshape(len(weights), -1, table.shape[-1])
-    return _Solution.of(table, solve_each(weighted[:, :, :-1], weighted[:, :, -1:])[:, :, 0])
+    """Coefficients of least weighted squares; errors are those of the condensed runs."""
+    weighted = (weights[:, None, None] * table).reshape(-1, table.shape[2])
+    return _Solution.of(table, solve_linear(weighted[:, :-1], weighted[:, -1], _RANK_LIMIT))
 
 
 def _factor(gram: Floats) -> Floats:
-    """(..., K, K) upper triangles T with Tᵀ T the given ones, or the nearest that have such."""
+    """(R, K, K) upper triangles T with Tᵀ T the given ones, or the nearest that have such."""
     try:
-        return np.asarray(np.linalg.cholesky(gram).swapaxes(-1, -2), dtype=float)
+        return np.asarray(np.linalg.cholesky(gram).transpose(0, 2, 1), dtype=float)
     except np.linalg.LinAlgError:  # a model that fits to rounding: the interpolation error exceeds the ridge
         values, vectors = np.linalg.eigh(gram)
-        return np.linalg.qr(np.sqrt(np.maximum(values, _RIDGE))[..., :, None] * vectors.swapaxes(-1, -2))[1]
+        return np.linalg.qr(np.sqrt(np.maximum(values, _RIDGE))[:, :, None] * vectors.transpose(0, 2, 1))[1]
 
 
-def _reweighted(design: _Design, gram: Floats, kept: NDArray[np.bool_], reweightings: int) -> _Solution:
+def _reweighted(design: _Design, gram: Floats, reweightings: int) -> _Solution:
     table, _ = design.table(gram)
-    solution = _solve(table, kept.astype(float))
+    solution = _solve(table, np.ones(len(gram)))
     for _ in range(reweightings):
-        solution = _solve(table, kept * robust_weights(solution.nrmse_pp, _MIN_ERROR_PP))
+        solution = _solve(table, robust_weights(solution.nrmse_pp, _MIN_ERROR_PP))
     return solution
 
 
-def _finish(design: _Design, solution: _Solution, k: int, functions: dict[str, ParameterFunction]) -> JointFunctionFit:
-    values: Iterator[float] = iter(solution.coefficients[k].tolist())
-    for name, law in design.forms[k if len(design.forms) > 1 else 0].items():
-        if coefficients := tuple(islice(values, len(law.form.terms))):
-            functions[name] = ParameterFunction(law.name, coefficients, law.rates)
+def _finish(design: _Design, solution: _Solution, functions: dict[str, ParameterFunction]) -> JointFunctionFit:
+    parts = np.split(solution.coefficients, np.cumsum(design.sizes)[:-1])
+    for (name, form), values in zip(design.forms.items(), parts, strict=True):
+        if form.terms:
+            functions[name] = ParameterFunction(form.name, tuple(values.tolist()), design.rates[name])
     order = [*design.data.model_type.map_forms(), *functions]
     ordered = {name: functions[name] for name in dict.fromkeys(order) if name in functions}
-    return JointFunctionFit(ParameterMap(design.data.model_type, ordered), solution.nrmse_pp[k])
+    return JointFunctionFit(ParameterMap(design.data.model_type, ordered), solution.nrmse_pp)
 
 
 _Trial = tuple[JointFunctionFit, dict[str, Floats]]  # and its errors by kind of fold
@@ -324,7 +316,6 @@ def choose_forms(
     for _ in range(_PASSES):
         before = dict(forms)
         for name, laws in options.items():
-            _try_all(data, [{**forms, name: law} for law in laws], start)
             for law in laws:
                 if law == forms[name]:
                     continue
@@ -344,9 +335,7 @@ def choose_forms(
         if forms == before:
             break
     forms, fit = _with_nearer_rates(data, forms, start, units)
-    every = np.ones((1, data.scale.size), dtype=bool)
-    fits = fit_jointly(data, [forms], [fit.parameters.functions.get(data.shape)], every)
-    return FormChoice(forms, fits[0], refused)
+    return FormChoice(forms, fit_jointly(data, forms, fit.parameters.functions.get(data.shape)), refused)
 
 
 def _with_nearer_rates(
@@ -385,32 +374,20 @@ def _risen(
 
 def _tried(data: Condensed, forms: Mapping[str, Law], shape_values: tuple[float, ...]) -> _Trial:
     """Return a fit with some forms, and its errors by kind of fold."""
-    _try_all(data, [forms], shape_values)
-    trial = data.trials[*forms.items(), shape_values]
-    if isinstance(trial, IdentificationError):
-        raise trial
-    return trial
-
-
-def _try_all(data: Condensed, trials: Sequence[Mapping[str, Law]], shape_values: tuple[float, ...]) -> None:
-    """Fit with each of several forms, all at once, and keep the fits, or why there is none."""
     # Of all forms and of those over the current alone, and in the second pass, many are the same.
-    able, starts = list[Mapping[str, Law]](), list[ParameterFunction | None]()
-    for forms in trials:
-        if (key := (*forms.items(), shape_values)) in data.trials:
-            continue
-        try:
-            for name in data.linear:
-                if not forms[name].rates and forms[name].form.terms:
-                    require_determined(forms[name].name, data.conditions)
-            starts.append(_start(forms[data.shape].name, data.conditions, shape_values) if data.shape else None)
-            able.append(forms)
-        except IdentificationError as error:
-            data.trials[key] = error
-    kept = np.ones((len(able), data.scale.size), dtype=bool)
-    fits = fit_jointly(data, able, starts, kept, reweightings=2, most_steps=5, polish=False) if able else []
-    for forms, fit in zip(able, fits, strict=True):
-        data.trials[*forms.items(), shape_values] = fit, leave_out_errors(data, fit, forms)
+    trial = *forms.items(), shape_values
+    if trial not in data.trials:
+        data.trials[trial] = _fitted(data, forms, shape_values)
+    return data.trials[trial]
+
+
+def _fitted(data: Condensed, forms: Mapping[str, Law], shape_values: tuple[float, ...]) -> _Trial:
+    for name in data.linear:
+        if not forms[name].rates and forms[name].form.terms:
+            require_determined(forms[name].name, data.conditions)
+    start = _start(forms[data.shape].name, data.conditions, shape_values) if data.shape else None
+    fit = fit_jointly(data, forms, start, reweightings=2, most_steps=5, polish=False)
+    return fit, leave_out_errors(data, fit, forms)
 
 
 @lru_cache(maxsize=16)  # the same for all forms of the other coordinates

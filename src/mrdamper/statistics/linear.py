@@ -37,7 +37,7 @@ def solve_linear(columns: Floats, right: Floats, rank_limit: float | None = None
 
 def _solved(columns: Floats, right: Floats, gram: Floats, moments: Floats, rank_limit: float | None = None) -> Floats:
     """Solve `solve_linear`, given the products of the columns with each other and with the right side."""
-    if (inverse := inverse_of_gram(gram)) is not None:
+    if (inverse := _inverse_of_gram(gram)) is not None:
         # Normal equations with one refinement: as accurate as a factorisation of N rows.
         solution = inverse @ moments
         return solution + inverse @ ((right - columns @ solution) @ columns)
@@ -50,7 +50,7 @@ def solve_weighted(columns: Floats, right: Floats, weights: Floats, rank_limit: 
     squares, width = weights**2, columns.shape[1]
     products = (columns[:, :, None] * columns[:, None, :]).reshape(len(columns), -1)
     gram: Floats = (squares @ products).reshape(-1, width, width)
-    if (inverse := inverse_of_gram(gram)) is None:
+    if (inverse := _inverse_of_gram(gram)) is None:
         each = [solve_linear(columns * own[:, None], right * own, rank_limit) for own in weights]
         return np.array(each).reshape(-1, width)
     solution: Floats = np.zeros(gram.shape[:2])
@@ -162,7 +162,7 @@ def _sizes(gram: Floats) -> Floats:
     return scale
 
 
-def inverse_of_gram(gram: Floats) -> Floats | None:
+def _inverse_of_gram(gram: Floats) -> Floats | None:
     """Invert Gram matrices by equilibrated columns; None as `_inverse`."""
     scale = _sizes(gram)
     row, column = scale[..., None, :], scale[..., :, None]

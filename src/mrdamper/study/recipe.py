@@ -235,10 +235,7 @@ def fit_functions_jointly(
 ) -> FitResult:
     """Parameter functions, or those of the current alone, fitted to the forces of all runs at once."""
     about = _about(runs, identifications, way)
-    any_motion = way != _CURRENT_LAWS
-    fit, refit = fit_modified_jointly(
-        runs, identifications, about, any_motion=any_motion, folds=lambda: all_folds(runs)
-    )
+    fit, refit = fit_modified_jointly(runs, identifications, about, any_motion=way != _CURRENT_LAWS)
     return FitResult(fit.damper, refit, fit)
 
 
