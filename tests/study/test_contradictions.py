@@ -205,8 +205,8 @@ def test_clipped_runs_get_no_other_current_and_show_the_range_that_cuts_off_othe
     """Those flat at a level at which two others are cut off are excluded, though their own loop could be a damper's."""
     limit = 0.6 * max(float(np.max(np.abs(run.force))) for run in sound[9:])
     cut = [replace(run, force=np.clip(run.force, -limit, limit)) for run in sound[9:]]
-    knee = limit / (limit**12 + np.abs(sound[11].force) ** 12) ** (1 / 12)
-    runs = [*sound[:9], *cut[:2], replace(sound[11], force=sound[11].force * knee)]
+    reduction = limit / (limit**12 + np.abs(sound[11].force) ** 12) ** (1 / 12)
+    runs = [*sound[:9], *cut[:2], replace(sound[11], force=sound[11].force * reduction)]
     assert {one.run_id: one.code for one in find_contradictions(runs)} == {"t11": "W_CLIPPED"}
     assert find_contradictions([*sound[:9], cut[0], *sound[10:]]) == []
 

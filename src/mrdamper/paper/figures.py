@@ -287,7 +287,10 @@ def _r2_over_motions(name: str, form: str, study: Reproduction, axes: Texts) -> 
 
 
 def _constant_term(name: str, form: str, study: Reproduction, axes: Texts) -> Drawing:
-    """Draw a quantity less its function of current, a mark per motion, over frequency or f · A; Eq. 34: a plane."""
+    """Draw a quantity less its function of current, one point per motion, over frequency or f · A.
+
+    A plane has a line an amplitude [Qian et al. 2024, Eq. 34].
+    """
     values = _parameter(study, name)
     if values.size != len(study.conditions):
         return f"{name} was not identified on every run"

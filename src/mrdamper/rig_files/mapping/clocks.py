@@ -83,7 +83,7 @@ def with_epoch(table: RawTable) -> RawTable:
 
 
 def refuse_two_rates(table: RawTable, profile: Profile, time: Floats, displacement: Floats) -> None:
-    """Refuse a time column that contradicts the sampling rate that stands beside the columns.
+    """Refuse a time column that contradicts the sampling rate beside the columns or of the profile.
 
     An export of every n-th sample has a lower rate than it was recorded at: it is taken where the frequency that
     is stated is that of the time column, or where the profile names this column and no frequency contradicts it.

@@ -20,7 +20,7 @@ from mrdamper.rig_files.record import Finding, Record
 
 _ALIKE = 0.1  # relative difference of frequency and amplitude within which two motions are one
 _ALIKE_A = 0.03  # difference of the current within which two tests have the same [A]
-_FEWEST_AGREEING = 3  # tests of the amplitude that they state, for every one of half of it
+_FEWEST_AGREEING = 3  # tests of the amplitude that they state, for every test of another one
 _SEVERAL = 2.0  # ratio of peak-to-peak forces at equal conditions that no repetition explains
 _UNITS = {unit: TABLES["units"]["force"][unit] for unit in ("lbf", "kgf", "kN")}
 _OF_VERSIONS = COMPUTED | words("raw") | words("processed")
