@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -14,11 +13,9 @@ from mrdamper.data.parameters import param
 from mrdamper.errors import ParameterError, require_positive
 from mrdamper.models.base import Model, Scale, SearchAxis, axes_of
 from mrdamper.physics.motion import Excitation
-from mrdamper.tracing import Tape, choose, streamed
 
-_KNOTS = 4000  # of the table that inverts the flow curve, refined by Newton's method
-_NEWTON = 3
-_NEWTON_FROM_AFAR = 8
+_NEWTON = 5  # steps of Newton's method that invert the flow curve to rounding
+_AT_REST = 1e-300  # smallest speed [v_c] in the logarithm
 
 
 @dataclass(frozen=True)
@@ -105,33 +102,15 @@ class HerschelBulkley(Model):
         )
 
 
-def flow_step(tape: Tape, speed: Any, m: Any) -> Any:
-    """`flow_curve` for one sample: the curve is convex, so Newton's method converges from below."""
-
-    def flowing() -> Any:
-        y = np.log(speed)
-        level = np.log(m / (2 * m + 1))
-        u = np.minimum((y - level - np.log(1 + m / (m + 1))) / (1 + 1 / m), m * (y - level))
-        for _ in range(_NEWTON_FROM_AFAR):
-            value, slope = _log_speed(u, m)
-            u = u - (value - y) / slope
-        return 1 + np.exp(u)
-
-    return choose(speed > 0, flowing, lambda: 1.0)
-
-
-@streamed(flow_step)
 def flow_curve(speed: Floats, m: float) -> Floats:
     """Force over yield force at a speed.
 
-    `speed` (N,): |v|/v_c [-], not negative; `m`: flow index [-]. Returns (N,) array: G = 1/T, one at rest.
+    `speed` (N,): |v|/v_c [-], not negative; `m`: flow index [-]. Returns (N,) array: G = 1/T, one at rest. The curve is
+    convex over the logarithms, so Newton's method converges from below.
     """
-    knots, values = _table(m)
-    y = np.log(np.maximum(speed, np.exp(knots[0])))
-    # u = ln(G − 1) is nearly straight over the logarithm of the speed at both ends.
-    u = np.interp(y, knots, values)
-    beyond = y > knots[-1]
-    u[beyond] = values[-1] + m * (y[beyond] - knots[-1])
+    y = np.log(np.maximum(speed, _AT_REST))
+    level = np.log(m / (2 * m + 1))
+    u = np.minimum((y - level - np.log(1 + m / (m + 1))) / (1 + 1 / m), m * (y - level))
     for _ in range(_NEWTON):
         value, slope = _log_speed(u, m)
         u = u - (value - y) / slope
@@ -147,9 +126,3 @@ def _log_speed(u: Floats, m: float) -> tuple[Floats, Floats]:
     value = np.log(m / (2 * m + 1)) + (1 + 1 / m) * u + np.log(G + b) - 2 * np.log(G)
     slope = (1 + 1 / m) + e / (G + b) - 2 * e / G
     return value, slope
-
-
-@lru_cache(maxsize=8)
-def _table(m: float) -> tuple[Floats, Floats]:
-    u = np.linspace(-30.0, 40.0, _KNOTS)
-    return _log_speed(u, m)[0], u
