@@ -129,26 +129,29 @@ class PlayBypass(Model):
 
     def yield_force(self, current: Floats) -> Floats:
         """fy(I) [N]."""
-        return _level_law(current, self.fy0, self.fy1, self.Ic, self.si)
+        size = np.abs(current)
+        return self.fy0 + self.fy1 * current * (1 - np.exp(-size / self.Ic)) / (1 + self.si * size)
 
     @recorded
     def state(self, motion: Excitation) -> Floats:
         """S (N,), the lagged share of the yield force."""
-        v, seat = motion.velocity, np.minimum(self.e, self.d)
-        loaded = _loaded(motion.path, self.d, seat)
-        along = _along(v, loaded)
-        bypass = _bypass(v, self.cb, self.qb, self.yield_force(motion.current))
-        fading = _fading(motion.current, self.h0, self.h1)
-        seated = _seated(v, self.vh, fading, along)
+        v, current, seat = motion.velocity, motion.current, np.minimum(self.e, self.d)
+        speed, sign = np.abs(v), np.sign(v)
+        play = play_position(motion.path, self.d)
+        loaded = np.sign(play) * np.maximum(0.0, np.abs(play) - (self.d - seat)) * (1 / seat)
+        along = np.maximum(0.0, loaded * sign)
+        ratio = (self.cb / self.yield_force(current)) * (1 + self.qb * sign) * speed
+        bypass = ratio / np.sqrt(1 + ratio**2)
+        fading = np.clip(self.h0 + self.h1 * current, 0.0, 1.0)
+        seated = fading * speed / (speed + self.vh) * along
         held = (1 - fading) * loaded * leaking_load(motion.time, motion.path, seat, self.leak)
-        share = held + _sign(v) * (seated + (1 - along) * bypass)
-        return first_order_lag(motion.time, share, self.T)
+        return first_order_lag(motion.time, held + sign * (seated + (1 - along) * bypass), self.T)
 
     def force(self, motion: Excitation, state: Floats) -> Floats:
         x, v, a, current = motion.displacement, motion.velocity, motion.acceleration, motion.current
         viscous = (self.c0 + self.c1 * current) * v
         yielded = self.yield_force(current) * (state + self.asymmetry * np.abs(state))
-        return self.f0 + self.k * x * (1 - state) + viscous + self.cq * _speed(v) + yielded + self.m * a
+        return self.f0 + self.k * x * (1 - state) + viscous + self.cq * np.abs(v) + yielded + self.m * a
 
     @classmethod
     def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
@@ -180,59 +183,6 @@ class PlayBypass(Model):
             for name, (low, high, starts) in boxes.items()
             if ("e" if name == "seat_share" else name) in free
         )
-
-
-# Parts of the state and the force are cached while the search changes other parameters.
-
-
-@memoize_per_path
-def _speed(velocity: Floats) -> Floats:
-    return np.abs(velocity)
-
-
-@memoize_per_path
-def _sign(velocity: Floats) -> Floats:
-    return np.sign(velocity)
-
-
-@memoize_per_path
-def _level_law(current: Floats, fy0: float, fy1: float, Ic: float, si: float) -> Floats:
-    """fy(I) [N]."""
-    size = np.abs(current)
-    return fy0 + fy1 * current * (1 - np.exp(-size / Ic)) / (1 + si * size)
-
-
-@memoize_per_path
-def _loaded(path: Path, d: float, seat: float) -> Floats:
-    """φ, the relative load of the series spring."""
-    play = play_position(path, d)
-    return np.sign(play) * np.maximum(0.0, np.abs(play) - (d - seat)) * (1 / seat)
-
-
-@memoize_per_path
-def _along(velocity: Floats, loaded: Floats) -> Floats:
-    """η, the loading along the motion."""
-    return np.maximum(0.0, loaded * _sign(velocity))
-
-
-@memoize_per_path
-def _bypass(velocity: Floats, cb: float, qb: float, yield_force: Floats) -> Floats:
-    """b, the force of the bypass over the yield force."""
-    ratio = (cb / yield_force) * (1 + qb * _sign(velocity)) * _speed(velocity)
-    return ratio / np.sqrt(1 + ratio**2)
-
-
-@memoize_per_path
-def _fading(current: Floats, h0: float, h1: float) -> Floats:
-    """Stribeck amplitude h, within 0 and 1."""
-    return np.clip(h0 + h1 * current, 0.0, 1.0)
-
-
-@memoize_per_path
-def _seated(velocity: Floats, vh: float, fading: Floats, along: Floats) -> Floats:
-    """Calculate the part of the series force that increases with velocity, h |v|/(|v| + vh) η."""
-    speed = _speed(velocity)
-    return fading * speed / (speed + vh) * along
 
 
 def play_step(tape: Tape, path: Any, limit: Any) -> Any:
