@@ -17,7 +17,6 @@ from mrdamper.physics.motion import Excitation, sine
 from mrdamper.statistics.levenberg_marquardt import forward_differences
 from mrdamper.tracing import Tape, TraceError, program
 from mrdamper.tracing.compiled import RecordProgram
-from mrdamper.tracing.program import postorder
 from mrdamper.tracing.tangent import with_tangents
 
 NAMES = ("fy0", "fy1", "d", "e", "cb", "h0", "h1", "vh", "T", "qb", "Ic", "leak", "si")
@@ -82,19 +81,6 @@ def test_every_operation_has_the_slope_of_its_values():
 
     difference = (along(0.4 + 1e-6)[0] - along(0.4 - 1e-6)[0]) / 2e-6
     assert along(0.4)[1] == pytest.approx(difference, rel=1e-7)
-
-
-@pytest.mark.parametrize("integrated", [False, True])
-def test_parameters_that_move_through_one_expression_share_its_factor_but_beside_an_integrator(integrated):
-    tape = Tape()
-    p, q, x = cast(Any, tape.parameter("p", 0.4)), cast(Any, tape.parameter("q", 0.1)), cast(Any, tape.input("x"))
-    ratio = p * x + q
-    value = np.tanh(ratio / np.sqrt(1 + ratio * ratio)) - ratio
-    if integrated:
-        value = value + tape.loop([x], lambda rest: (rest > 1.0, [0.5 * rest]), 3)[0]
-    outputs = with_tangents(tape, value, ["q", "p"])
-    more = len(postorder([outputs["q"], outputs["p"]])) - len(postorder([outputs["q"]]))
-    assert (more == 1) is not integrated  # times x
 
 
 def test_a_branch_that_is_not_taken_has_no_part_in_a_slope():

@@ -2,8 +2,7 @@
 
 Every operation on the tape is followed by its derivative, and every memory and loop variable that depends on a
 parameter has a derivative, except those that determine the step sizes of a loop. At a kink the derivative is that of
-the branch taken. An expression that depends on the parameters through one earlier expression alone has the derivative
-of that one times a factor, which all parameters share.
+the branch taken.
 """
 
 from __future__ import annotations
@@ -31,7 +30,6 @@ _BY_ARGUMENT: Mapping[str, Callable[[Any, Any], Any]] = {
     "arctanh": lambda a, y: 1.0 / (1.0 - a * a),
 }
 _FLAT = frozenset({"sign", "input"})
-_BRANCHING = frozenset({"select", "minimum", "maximum"})  # these discard derivatives that may not be finite
 _TINY = 1e-300
 
 
@@ -44,86 +42,29 @@ def with_tangents(tape: Tape, output: Any, along: Sequence[str]) -> dict[str, An
     updates = dict(tape.updates)
     loops = {id(node): (node.start, node.updates) for node in nodes if isinstance(node, TracedLoop)}
     outputs = {"value": output}
-    chains = _Chains(tape, joined=not loops)
     for name in along:
         moving = _moving(nodes, updates, loops, name)
         slopes: dict[int, Any] = {id(tape.parameters[name]): 1.0}
         held = {m: tape.remember(f"{m}_by_{name}") for m, value in updates.items() if id(value) in moving}
         slopes |= {id(tape.memory[m]): slope for m, slope in held.items()}
         opened: dict[int, dict[int, int]] = {}  # by loop: place of the derivative of each loop variable
-        chains.begin(moving, slopes)
         for node in nodes:
             if isinstance(node, TracedLoop):
                 _, after = loops[id(node)]
-                node.updates = (*node.updates, *(chains.slope(after[i]) for i in opened.get(id(node), ())))
+                node.updates = (*node.updates, *(slopes.get(id(after[i]), 0.0) for i in opened.get(id(node), ())))
             elif id(node) not in moving or id(node) in slopes:
                 continue
             elif node.op in ("carry", "result"):
                 loop, place = node.args
                 if id(loop) not in opened:
-                    opened[id(loop)] = _open(loop, *loops[id(loop)], moving, chains)
+                    opened[id(loop)] = _open(loop, *loops[id(loop)], moving, slopes)
                 slopes[id(node)] = Expression(tape, node.op, (loop, opened[id(loop)][place]), SAMPLE)
             else:
-                chains.add(node)
+                slopes[id(node)] = _slope(tape, node, slopes)
         for memory, slope in held.items():
-            tape.update(slope, chains.slope(updates[memory]))
-        outputs[name] = chains.slope(output)
+            tape.update(slope, slopes.get(id(updates[memory]), 0.0))
+        outputs[name] = slopes.get(id(output), 0.0)
     return outputs
-
-
-class _Chains:
-    """Derivatives by each parameter: some written out, the others as factors of these.
-
-    All are written out if they are not `joined`: with an integrator, whose searches end at rounding errors.
-    """
-
-    def __init__(self, tape: Tape, *, joined: bool):
-        self.tape, self.joined = tape, joined
-        self.factors: dict[tuple[int, int], Any] = {}  # derivatives by an expression that contains all dependence
-
-    def begin(self, moving: set[int], slopes: dict[int, Any]) -> None:
-        """Begin with another parameter."""
-        self.moving, self.slopes = moving, slopes
-        self.above: dict[int, Expression] = {}  # by expression: the last one before it that contains all dependence
-        self.depth: dict[int, int] = {}
-
-    def add(self, node: Expression) -> None:
-        """Record the expression through which the dependence passes; with more than one, write the derivative out."""
-        first, *others = parts = [part for part in node.args if id(part) in self.moving]
-        above: Expression | None = first if self.joined and node.op not in _BRANCHING else None
-        for part in others:
-            above = self._meet(above, part)
-        if above is None:
-            self.slopes[id(node)] = _slope(self.tape, node, {id(part): self.slope(part) for part in parts})
-        else:
-            self.above[id(node)], self.depth[id(node)] = above, 1 + self.depth.get(id(above), 0)
-
-    def slope(self, node: Any) -> Any:
-        """Return the derivative of an expression by the parameter."""
-        root = node
-        while id(root) in self.above:
-            root = self.above[id(root)]
-        return _times(self.slopes.get(id(root), 0.0), self._factor(node, root))
-
-    def _meet(self, one: Expression | None, other: Expression) -> Expression | None:
-        while one is not None and one is not other:
-            if self.depth.get(id(one), 0) < self.depth.get(id(other), 0):
-                one, other = other, one
-            one = self.above.get(id(one))
-        return one
-
-    def _factor(self, node: Any, root: Any) -> Any:
-        """Return the derivative of an expression by one on its chain."""
-        value, at = 1.0, node
-        while at is not root:
-            above = self.above[id(at)]
-            if (id(node), id(above)) not in self.factors:
-                if (id(at), id(above)) not in self.factors:
-                    parts = {id(part): self._factor(part, above) for part in at.args if id(part) in self.moving}
-                    self.factors[id(at), id(above)] = _slope(self.tape, at, parts)
-                self.factors[id(node), id(above)] = _times(value, self.factors[id(at), id(above)])
-            value, at = self.factors[id(node), id(above)], above
-        return value
 
 
 def derivatives(tape: Tape, values: Sequence[Any], by: Any) -> list[Any]:
@@ -165,12 +106,12 @@ def _moving(
 
 
 def _open(
-    loop: TracedLoop, start: Sequence[Any], updates: Sequence[Any], moving: set[int], chains: _Chains
+    loop: TracedLoop, start: Sequence[Any], updates: Sequence[Any], moving: set[int], slopes: Mapping[int, Any]
 ) -> dict[int, int]:
     """Add derivatives to the variables of a loop, from those of its start; return their places."""
     moved = [i for i in range(loop.still, len(start)) if {id(start[i]), id(updates[i])} & moving]
     places = {place: len(loop.start) + k for k, place in enumerate(moved)}
-    loop.start = (*loop.start, *(chains.slope(start[i]) for i in moved))
+    loop.start = (*loop.start, *(slopes.get(id(start[i]), 0.0) for i in moved))
     return places
 
 
