@@ -631,6 +631,22 @@ def test_a_current_of_the_profile_is_compared_with_a_channel_that_the_profile_do
     assert [float(np.mean(record.current)) for record in found.records] == ([] if codes else [value])
 
 
+@pytest.mark.parametrize(("stated", "contradicts"), [(1.0, False), (0.7, False), (3.0, True)])
+@pytest.mark.parametrize("place", ["name", "heading", "tests.csv"])
+def test_a_current_that_a_varying_channel_never_reaches_contradicts_it(tmp_path, place, stated, contradicts):
+    t = np.arange(0.0, 6.0, 0.002)
+    x, v = 10 * np.sin(2 * np.pi * t), 0.02 * np.pi * np.cos(2 * np.pi * t)
+    table = np.column_stack([t, x, 300 * np.sign(v) + 4000 * v, 0.6 + 0.4 * np.sin(2 * np.pi * 0.5 * t)])
+    names = "Time [s],Position [mm],Force [N],Current [A]"
+    heading = f"Coil current: {stated} A\n{names}" if place == "heading" else names
+    name = f"run_{stated}A" if place == "name" else "run"
+    np.savetxt(tmp_path / f"{name}.csv", table, delimiter=",", header=heading, comments="")
+    if place == "tests.csv":
+        (tmp_path / "tests.csv").write_text(f"run_id,current_A\nrun,{stated}\n", encoding="utf-8")
+    found = import_files([tmp_path])
+    assert [refusal.error.code for refusal in found.refusals] == ["E_CURRENT_CONTRADICTS"] * contradicts
+
+
 @pytest.mark.parametrize(
     "line",
     [

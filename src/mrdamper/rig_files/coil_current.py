@@ -93,14 +93,12 @@ def _agreed(statements: list[Statement], channel: Floats | None, where: str) -> 
     if not statements:
         return None
     current, whence, others = statements[0].amperes, statements[0].whence, statements[1:]
-    finite = np.empty(0) if channel is None else channel[np.isfinite(channel)]
-    mean, change = held_current(finite) if finite.size >= 3 else (current, "")
     against = [f"{other.whence} gives {other.amperes:g} A" for other in others if contradicts(other.amperes, current)]
-    measured = [f"the current channel gives {mean:g} A"] if not change and contradicts(mean, current) else []
+    has = "" if channel is None else contradicted(channel, current, varying=whence == _PROFILE)
+    measured = [f"the current channel gives {has}"] if has else []
     over = [statement for statement in statements if abs(statement.amperes) > LARGEST_STATED]
     if whence == _PROFILE:
-        varies = [f"the current channel goes from {number(finite.min(), 3)} to {finite.max():.3g} A"] if change else []
-        code, whence, against = "E_CURRENT_CONTRADICTS", "the profile", [*varies, *measured, *against]
+        code, whence, against = "E_CURRENT_CONTRADICTS", "the profile", [*measured, *against]
         remedy = "leave [current] out of the profile; if the file is wrong, correct it, or rename it"
     elif over or against:
         code, remedy = "E_RANGE" if over else "E_AMBIGUOUS", _DECIDE
@@ -238,9 +236,8 @@ def with_stated_current(record: Record, current: float, whence: str, where: str,
     Raises `ColumnError`: E_CURRENT_CONTRADICTS if the channel, name or heading of the file states another.
     """
     own = record.provenance.get("current_from", "")
-    mean = None if record.current is None else contradicted(record.current, current)
-    if mean is not None:
-        raise _two_statements(record, mean, current, whence, where)
+    if record.current is not None and (has := contradicted(record.current, current)):
+        raise _two_statements(record, has, current, whence, where)
     if record.current is not None and not own:
         return record
     findings = tuple(f for f in record.findings if not f.text.startswith((NO_CHANNEL, _NOT_TAKEN)))
@@ -256,13 +253,13 @@ def other_statement(record: Record, current: float, whence: str, where: str) -> 
     own = record.provenance.get("current_from", "")
     mean = float(np.mean(record.current)) if own and record.current is not None else current
     other = contradicts(mean, current, conditions.WRITTEN)
-    return _two_statements(record, mean, current, whence, where) if other else None
+    return _two_statements(record, f"{mean:g} A", current, whence, where) if other else None
 
 
-def _two_statements(record: Record, mean: float, current: float, whence: str, where: str) -> ColumnError:
-    """Return the error for a stated current where the record has another [A]."""
+def _two_statements(record: Record, has: str, current: float, whence: str, where: str) -> ColumnError:
+    """Return the error for a stated current [A] where the record has another, told with its unit."""
     own = record.provenance.get("current_from", "")
-    problem = printable(f"{whence} gives {current:g} A, {record.id} has {mean:g} A ({own or 'current channel'})")
+    problem = printable(f"{whence} gives {current:g} A, {record.id} has {has} ({own or 'current channel'})")
     remedy = _DECIDE if own else f"correct {whence}; {_CHANNEL_WRONG}"
     return ColumnError(problem, where=printable(where), remedy=remedy, code="E_CURRENT_CONTRADICTS")
 
@@ -401,8 +398,16 @@ def constant(value: float, like: Floats) -> Floats:
     return np.broadcast_to(np.float64(value), like.shape)
 
 
-def contradicted(channel: Floats, stated: float) -> float | None:
-    """Return the mean of a constant current channel that contradicts what is stated [A]; None where it does not."""
+def contradicted(channel: Floats, stated: float, varying: bool = False) -> str:
+    """Tell what a current channel has that contradicts what is stated [A]; empty where it does not.
+
+    A channel that varies does so where it never reaches what is stated or, if so told, always.
+    """
     finite = channel[np.isfinite(channel)]
-    mean, change = held_current(finite) if finite.size >= 3 else (stated, "")
-    return mean if not change and contradicts(mean, stated) else None
+    if finite.size < 3:
+        return ""
+    mean, change = held_current(finite)
+    nearest = float(finite[np.argmin(np.abs(np.abs(finite) - abs(stated)))])
+    if change and (varying or contradicts(nearest, stated)):
+        return f"{number(float(finite.min()), 3)} to {finite.max():.3g} A"
+    return "" if change or not contradicts(mean, stated) else f"{mean:g} A"

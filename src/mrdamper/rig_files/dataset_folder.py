@@ -217,9 +217,9 @@ def run_of(row: Mapping[str, str | None], samples: Channels, path: Path) -> Run:
     stated, current = number("current_A"), channels.get("current_A")
     if current is None:
         current = _driven(channels, number, where) if stated is None else stated
-    elif stated is not None and (mean := contradicted(current, stated)) is not None:
+    elif stated is not None and (has := contradicted(current, stated)):
         raise ColumnError(
-            f"current_A is {stated:g} A, and {mean:g} A in the samples", where=where, code="E_CURRENT_CONTRADICTS",
+            f"current_A is {stated:g} A, and {has} in the samples", where=where, code="E_CURRENT_CONTRADICTS",
             remedy="if the samples are wrong, remove their current_A; else leave the cell of runs.csv empty",
         )  # fmt: skip
     start, end = number("steady_t0_s"), number("steady_t1_s")
