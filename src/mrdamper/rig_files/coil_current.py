@@ -220,7 +220,7 @@ def with_current_behind_label(record: Record, path: Path, names: Collection[str]
 
     The first of its names that states a current at all counts.
     """
-    unclear = (conditions.behind_digits, conditions.letter_as_mark)
+    unclear = (conditions.behind_digits, conditions.LETTER_AS_MARK.search)
     place = next((name for name in _places(record, path) if any(of(name) for of in unclear)), "")
     current = conditions.current_behind_label(place, names)
     if current is None:

@@ -77,17 +77,12 @@ _PLAIN = re.compile(r"[A-Za-zµμΩ°]{1,20}(?:\^?-?[1-4])?(?:[*/·⋅ ][A-Za-z�
 
 def parse_unit(text: str) -> Unit | None:
     """Return the unit a text states, None if it states none that is known."""
-    return _parse(text) if len(text) <= 40 else None
+    return (_from_table(text) or _from_pint(text)) if len(text) <= 40 else None
 
 
 def is_unit(text: str) -> bool:
     """Tell if a text is nothing but one of the field's units."""
     return len(text) <= 40 and _from_table(text) is not None
-
-
-@lru_cache(maxsize=512)
-def _parse(text: str) -> Unit | None:
-    return _from_table(text) or _from_pint(text)
 
 
 @lru_cache(maxsize=512)
@@ -115,6 +110,7 @@ def _normal(text: str) -> str:
     return re.sub(r"/s/s$", "/s2", re.sub(r"(?i)/sec", "/s", re.sub(r"\s*/\s*", "/", text)))
 
 
+@lru_cache(maxsize=512)
 def _from_pint(text: str) -> Unit | None:
     if not _PLAIN.fullmatch(text) or len(text) < 2:
         return None

@@ -30,7 +30,9 @@ _BEHIND_LABEL = re.compile(  # MRD-7_0.5A: no decimal is written so
     r"(?<![0-9])[0-9]+_[0-9]+(?:[.,xp][0-9]+[ _]?m?|[ _]?m)A(?![A-Za-z0-9])"
 )
 _BEHIND_LONG_LABEL = re.compile(r"(?<![0-9])[0-9]{2,}_[0-9]+[ _]?A(?![A-Za-z0-9])")  # run12_1A
-_LETTER_AS_MARK = re.compile(r"(?<![A-Za-z0-9.,])([0-9]{1,2})A([0-9]{1,2})(?![A-Za-z0-9])")  # 0A5
+LETTER_AS_MARK = re.compile(  # the decimal mark may be the letter of the unit: 0A5, as 4K7 of a resistor
+    r"(?<![A-Za-z0-9.,])([0-9]{1,2})A([0-9]{1,2})(?![A-Za-z0-9])"
+)
 _LARGEST_STEP = 5  # [A] of tests at whole amperes, from 0 A on
 _NEXT_NUMBER = re.compile(r"_A_[0-9.]+(?:_|\.[a-z]{2,4}$|$)")  # 2_A_20: the name of the next number
 _NEGATIVE = re.compile(r"[=:]\s*[-−]$")  # a dash elsewhere may stand between two parts of a name
@@ -170,15 +172,10 @@ def _means_current(letters: str) -> bool:
     return letters in _LEVELS or column_names.role_of(letters) == "current"
 
 
-def letter_as_mark(name: str) -> re.Match[str] | None:
-    """Return the number of a name whose decimal mark may be the letter of the unit: 0A5, as 4K7 of a resistor."""
-    return _LETTER_AS_MARK.search(name)
-
-
 def _with_letter_as_mark(name: str, names: Collection[str]) -> float | None:
     """Return the current [A] of a name such as MRD_0A5_2Hz, where other names have 0A0 and a third number there."""
-    match = letter_as_mark(name)
-    alike = [m for m in map(letter_as_mark, {*names}) if m and match and m.string[: m.start()] == name[: match.start()]]
+    match, others = LETTER_AS_MARK.search(name), map(LETTER_AS_MARK.search, {*names})
+    alike = [m for m in others if m and match and m.string[: m.start()] == name[: match.start()]]
     stated = {float(f"{m[1]}.{m[2]}") for m in alike}
     fits = match and 0.0 in stated and len(stated) > 2 and max(stated) <= LARGEST_STATED
     return float(f"{match[1]}.{match[2]}") if match and fits else None

@@ -74,7 +74,12 @@ def _of_parquet(table: RawTable, path: Path) -> dict[str, Channels]:
             if error.code not in ("E_NUMBER", "E_UNSAFE"):
                 raise
             refuse_text(name, path)
-        _refuse_bomb(8 * ids.codes.size * (len(channels) + 1), path)
+        packed = path.stat().st_size
+        most = max(_UNPACKED, _RATIO * packed)
+        if 8 * ids.codes.size * (len(channels) + 1) > most:
+            problem = f"{packed:,} bytes unpack to over {most:,}"
+            remedy = "a test does not compress like that; write the samples again"
+            raise DatasetError(problem, where=str(path), remedy=remedy, code="E_ARCHIVE_RATIO")
     return _by_run(ids.codes, ids.labels, channels)
 
 
@@ -113,15 +118,6 @@ def refuse_text(name: str, path: Path) -> bool:
         remedy = "write plain numbers with a decimal point"
         raise ColumnError(f"column {name} holds text", where=str(path), remedy=remedy)
     return False
-
-
-def _refuse_bomb(size: int, path: Path) -> None:
-    packed = path.stat().st_size
-    most = max(_UNPACKED, _RATIO * packed)
-    if size > most:
-        problem = f"{packed:,} bytes unpack to over {most:,}"
-        remedy = "a test does not compress like that; write the samples again"
-        raise DatasetError(problem, where=str(path), remedy=remedy, code="E_ARCHIVE_RATIO")
 
 
 def _by_run(codes: np.ndarray, labels: tuple[str, ...], channels: Channels) -> dict[str, Channels]:
@@ -164,10 +160,16 @@ def load_motion(path: str | Path, current: float | None = None) -> Run:
     columns = {name: _numbers(table, name, path) for name in wanted}
     if current is None and "current_A" not in columns:
         raise ColumnError("no current", where=str(path), remedy="give --current A, or a column current_A")
-    _refuse_gap(columns["time_s"], path)
+    time = columns["time_s"]
+    steps = np.diff(time)
+    wide = np.flatnonzero(steps > 5 * np.median(steps)) if steps.size else ()
+    if len(wide):
+        problem = f"a gap of {number(steps[wide[0]])} s after {time[wide[0]]:.6g} s"
+        remedy = "predict each part separately: the damper's state is unknown after a gap"
+        raise RunError(problem, where=str(path), remedy=remedy, code="E_TIME_GAP")
     return Run(
         id=path.stem,
-        time=columns["time_s"],
+        time=time,
         displacement=columns["displacement_m"],
         force=np.zeros(table.height),
         current=columns.get("current_A", np.array(current)),
@@ -202,13 +204,3 @@ def _numbers(table: pl.DataFrame, name: str, path: Path) -> Floats:
         reason = f"column {name} has {values.null_count()} empty cells"
         raise ColumnError(reason, where=str(path), remedy="remove those rows")
     return values.to_numpy().astype(np.float64)
-
-
-def _refuse_gap(time: Floats, path: Path) -> None:
-    steps = np.diff(time)
-    wide = steps > 5 * np.median(steps) if steps.size else np.zeros(0, dtype=bool)
-    if wide.any():
-        at = int(np.argmax(wide))
-        problem = f"a gap of {number(steps[at])} s after {time[at]:.6g} s"
-        remedy = "predict each part separately: the damper's state is unknown after a gap"
-        raise RunError(problem, where=str(path), remedy=remedy, code="E_TIME_GAP")

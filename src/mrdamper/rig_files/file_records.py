@@ -180,7 +180,12 @@ def tables_of_tests(tables: list[RawTable], profile: Profile) -> tuple[list[RawT
     if parts:
         text = printable(f"tables without all channels are not taken for tests: {listed(parts, 5)}")
         fitting[0] = fitting[0].noted(Finding("W_TABLE", text))
-    return fitting, [_incomplete(*others[i]) for i in tests]
+    incomplete = list[InputError]()
+    for table, error in (others[i] for i in tests):
+        where, label = f"{printable(table.source.name)}, table {printable(table.label)}", toml(table.label)
+        remedy = f"give it the channels of the other tables, or set [file] leave_out = [{label}] in a profile"
+        incomplete.append(ColumnError(error.found, where=where, remedy=remedy, code=error.code))
+    return fitting, incomplete
 
 
 def _resembles_a_test(table: RawTable, tests: list[RawTable], profile: Profile) -> bool:
@@ -194,14 +199,6 @@ def _resembles_a_test(table: RawTable, tests: list[RawTable], profile: Profile) 
     force = assign(alike, profile)["force"].column
     rows, usual = (of.read([i]).values[i].size for of, i in ((table, columns[0]), (alike, force)))
     return rows >= _ROWS_OF_A_TEST * usual
-
-
-def _incomplete(table: RawTable, error: InputError) -> InputError:
-    """Return the refusal of one of a file's tests, with its table named."""
-    label = toml(table.label)
-    where = f"{printable(table.source.name)}, table {printable(table.label)}"
-    remedy = f"give it the channels of the other tables, or set [file] leave_out = [{label}] in a profile"
-    return ColumnError(error.found, where=where, remedy=remedy, code=error.code)
 
 
 @contextlib.contextmanager

@@ -241,7 +241,8 @@ def profile_text(profile: Profile, unset: Mapping[str, Sequence[str]] = MappingP
     sections["current.values"] = sections["current"].pop("values", {})
     for name, section in sections.items():
         if section or name in unset or name.startswith("channels."):
-            lines += ["", f"[{name}]", *(f"{_key(key)} = {toml(value)}" for key, value in section.items())]
+            keys = [key if re.fullmatch(r"[A-Za-z0-9_]+", key) else toml(key) for key in section]
+            lines += ["", f"[{name}]", *map("{} = {}".format, keys, map(toml, section.values()))]
             lines += [f"#{line}" for line in unset.get(name, ()) if line.partition(" ")[0] not in section]
     return "\n".join(lines) + "\n"
 
@@ -302,10 +303,6 @@ def _as_expression(pattern: str) -> str:
     meant["*/"] = "(?:.*?/)?"  # the folders of */lvl{current}/* may be all there are
     inner = "".join(meant.get(part, re.escape(part)) for part in parts)
     return inner if re.search(r"\.[A-Za-z0-9]{1,5}$|\*$", pattern) else inner + r"(?:\..*)?"
-
-
-def _key(key: str) -> str:
-    return key if re.fullmatch(r"[A-Za-z0-9_]+", key) else toml(key)
 
 
 def toml(value: Any) -> str:

@@ -206,21 +206,16 @@ def _counted_time(table: RawTable, profile: Profile, size: int) -> tuple[Floats,
 
 def corrected_force(channels: dict[str, Floats], correction: Correction) -> tuple[Floats, str]:
     """Force without the inertia of what moves with the load cell and without gas force [N], and how it was made."""
-    measured = channels.get("acceleration")
-    acceleration = measured if measured is not None else _curvature(channels["time"], channels["displacement"])
-    whence = "the accelerometer" if measured is not None else "the displacement"
+    acceleration, whence = channels.get("acceleration"), "the accelerometer"
+    if acceleration is None:  # by local quadratics, NaN where a sample is missing
+        time, displacement, whence = channels["time"], channels["displacement"], "the displacement"
+        there = np.isfinite(time) & np.isfinite(displacement)
+        acceleration = np.full(time.shape, np.nan)
+        acceleration[there] = smooth(time[there], displacement[there])[2]
     mass, gas = correction.moving_mass_kg, correction.gas_force_N
     notes = [f"{mass:g} kg times acceleration by {whence} subtracted"] * bool(mass)
     notes += [f"{gas:g} N of gas force added"] * bool(gas)
     return channels["force"] - mass * acceleration + gas, ", ".join(notes) or "none"
-
-
-def _curvature(time: Floats, displacement: Floats) -> Floats:
-    """Acceleration [m/s²] by local quadratics, NaN where a sample is missing."""
-    there = np.isfinite(time) & np.isfinite(displacement)
-    acceleration = np.full(time.shape, np.nan)
-    acceleration[there] = smooth(time[there], displacement[there])[2]
-    return acceleration
 
 
 def _further(table: RawTable, assigned: dict[str, Assigned], size: int) -> dict[str, Floats]:

@@ -54,8 +54,10 @@ def joined(records: list[Record], profile: Profile, tables: list[RawTable]) -> l
         return records
     if how == "join":
         return [_concatenated(records)]
-    if _state_different_conditions(tables):
-        return records
+    for values_in in (currents_in, lambda line: sorted(motions_in(line[:255], "Hz"))):
+        stated = {tuple(value for line in table.remarks for value in values_in(line)) for table in tables} - {()}
+        if len(stated) > 1:  # titles of different currents or frequencies: each block is a test
+            return records
     chains: list[list[Record]] = []
     for record in records:
         if chains and _gap(chains[-1][-1], record) <= 1.0:
@@ -168,15 +170,6 @@ def _gap(one: Record, other: Record) -> float:
     steps = _steps_between(one.time, other.time)
     seconds = float(np.nanmin(other.time) - np.nanmax(one.time)) if steps > 0 else np.inf
     return min(seconds / OFF_S, steps / OFF_STEPS) if steps > 0 else np.inf
-
-
-def _state_different_conditions(tables: list[RawTable]) -> bool:
-    """Return whether the titles of blocks state different currents or frequencies: each is a test."""
-    for values_in in (currents_in, lambda line: sorted(motions_in(line[:255], "Hz"))):
-        stated = {tuple(value for line in table.remarks for value in values_in(line)) for table in tables} - {()}
-        if len(stated) > 1:
-            return True
-    return False
 
 
 def stretches_of_session(time: Floats, displacement: Floats, current: Floats | None) -> list[slice]:

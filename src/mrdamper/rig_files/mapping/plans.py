@@ -117,7 +117,8 @@ def _by_rows(results: Results, tests: Tests) -> Iterator[Mapping[int, float]]:
             return {own[0]: rows.current[0]}
         names = [called[i] for i in own]
         starts = [(_start(tests[i]), float(np.ptp(tests[i][1].time))) for i in own]
-        by_head = rows.by_test([_head(tests[i][1]) for i in own], whole_names=True)
+        heads = [tests[i][1].provenance.get(HEAD, "").split("; ") for i in own]  # lines above a test: name and value
+        by_head = rows.by_test(heads, whole_names=True)
         by_file = rows.by_test(names, whole_names=True)
         if len(by_head) == len(by_file) == len(own) and by_head != by_file:
             return {}
@@ -355,11 +356,6 @@ def _called(tests: Tests) -> list[tuple[str, ...]]:
         paths = ["\\".join((*file.parts[-n:-1], name)) for n in (2, 3, 4) for name in (file.name, file.stem)]
         names.append((record.id, file.name, file.stem, own, *blocks, *paths))
     return names
-
-
-def _head(record: Record) -> list[str]:
-    """Return the lines above a test that hold a name and a value."""
-    return record.provenance.get(HEAD, "").split("; ")
 
 
 def _start(test: tuple[Path, Record]) -> str:

@@ -76,16 +76,12 @@ def with_counts(table: RawTable) -> RawTable:
     stated = {m.groups() for line in table.lines for m in _NUMBER_IS.finditer(line)}
     for i, header in enumerate(table.headers):
         own = [of for of in stated if of[0].casefold() == header.name.casefold()]  # two: which, or a line through both
-        if len(own) == 1 and own[0][1] in FULL_SCALES and not header.unit and _is_whole(table, i):
+        values = table.try_read(i) if len(own) == 1 and own[0][1] in FULL_SCALES and not header.unit else None
+        if values is not None and not np.any(np.nan_to_num(values[i]) % 1):
             name, number, value, unit = own[0]
             table = replace(table, remarks=(*table.remarks, f"{name}: {number} counts = {value} {unit}"))
             table = table.named({i: (header.name, "counts")})
     return table
-
-
-def _is_whole(table: RawTable, column: int) -> bool:
-    values = table.try_read(column)
-    return values is not None and not np.any(np.nan_to_num(values[column]) % 1)
 
 
 def with_scales(table: RawTable) -> RawTable:

@@ -143,7 +143,9 @@ def _channels(view: View) -> dict[str, _Channel]:
     for name in _OTHER:
         values = view.channels[name]
         low, high = float(np.nanmin(values)), float(np.nanmax(values))
-        channels[name] = _Channel(values, _equal_stretches(values), low, high, name == "displacement")
+        starts, stops = runs_of(values[1:] == values[:-1])
+        equal = np.column_stack([starts, stops + 1])[stops + 1 - starts >= FLAT]
+        channels[name] = _Channel(values, equal, low, high, name == "displacement")
     return channels
 
 
@@ -152,7 +154,7 @@ class _Channel:
     """A channel, its stretches of equal samples, and how fine it is."""
 
     values: Floats
-    equal: np.ndarray
+    equal: np.ndarray  # of at least `FLAT` samples
     low: float
     high: float
     smooth: bool  # a position: a kink in it is evidence even at coarse resolution
@@ -241,12 +243,6 @@ class _Channel:
         # Below the resolution, a slow plateau of a coarse channel is as quiet.
         limits = [max(self.level, 0.02 * float(np.median(np.abs(step))), _ROUNDING * self.span) for step in steps]
         return all(sample_noise(side) > limit for side, limit in zip(sides, limits, strict=True))
-
-
-def _equal_stretches(values: Floats) -> np.ndarray:
-    starts, stops = runs_of(values[1:] == values[:-1])
-    stretches = np.column_stack([starts, stops + 1])
-    return stretches[stretches[:, 1] - starts >= FLAT]
 
 
 class Top(NamedTuple):

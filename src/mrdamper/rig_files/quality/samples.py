@@ -273,16 +273,12 @@ def order_of_time(view: View) -> None:
         problem = f"time stamp {before:.9g} s is repeated {where}{more}"
         raise view.refused("E_TIME_DUPLICATE", problem, f"write time with more decimals, or {remedy}")
     problem = f"time runs backwards {where}, from {before:.9g} s to {after:.9g} s{more}"
-    raise view.refused("E_TIME_ORDER", problem, _turning_back(before - after))
-
-
-def _turning_back(seconds: float) -> str:
-    """Remedy for a clock that goes back by a time."""
-    if abs(seconds - _DAY) < _NEAR:
-        return "export the time of day with its date: the test went on past midnight"
-    if abs(seconds - _HOUR) < _NEAR:
-        return "export the stamps with their offset from UTC: the clocks were put back an hour"
-    return "sort the rows, or split the file where the logger started again"
+    remedy = "sort the rows, or split the file where the logger started again"
+    if abs(before - after - _DAY) < _NEAR:
+        remedy = "export the time of day with its date: the test went on past midnight"
+    elif abs(before - after - _HOUR) < _NEAR:
+        remedy = "export the stamps with their offset from UTC: the clocks were put back an hour"
+    raise view.refused("E_TIME_ORDER", problem, remedy)
 
 
 def gaps_in_time(view: View) -> Iterator[Finding]:

@@ -103,7 +103,11 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
     trailing |= header is not None and separator != SPACES and _names_notes(cells_of(lines[header], separator), width)
     if len(names) != width:
         raise _mismatch(source, separator, len(names), width, first, lines)
-    units = _cells(lines[unit_row], separator, width) if unit_row is not None else _unit_alone(lines[:first], width)
+    if unit_row is not None:
+        units = _cells(lines[unit_row], separator, width)
+    else:  # that of the only column may stand in a line above
+        alone = [match[1] for line in lines[:first] if width == 1 and (match := _UNIT_OF_ALL.match(line))]
+        units = tuple(alone) if len(alone) == 1 and is_unit(alone[0]) else ("",) * width
     units = ("" if units[0].casefold() in UNIT_KEYS else units[0], *units[1:])
     columns = [[row[i] for row in rows if len(row) > i] for i in range(width)]
     names = tuple("" if n == X_VALUE and not any(c) else n for n, c in zip(names, columns, strict=True))
@@ -133,12 +137,6 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         behind,
         form.decimal is not None,
     )
-
-
-def _unit_alone(above: Sequence[str], width: int) -> tuple[str, ...]:
-    """Units of columns without a row of units: that of the only column may stand in a line above."""
-    alone = [match[1] for line in above if width == 1 and (match := _UNIT_OF_ALL.match(line))]
-    return tuple(alone) if len(alone) == 1 and is_unit(alone[0]) else ("",) * width
 
 
 def _with_name_of_numbers(above: Sequence[str], separator: str, width: int) -> list[str]:
