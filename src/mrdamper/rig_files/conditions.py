@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from datetime import date
+from datetime import date, time
 from functools import lru_cache
 from types import MappingProxyType
 from typing import NamedTuple
@@ -107,6 +107,9 @@ _DAYS = tuple(  # the surest form first: 2024-05-31, 31/5/2024, 31 May 2024 and 
         r"\d{1,2}(?P<mark>[-./])\d{1,2}(?P=mark)(?:19|20)\d\d",
         r"(?<!\w)(?P<mark>)(?:\d{1,2}[. -]+[^\W\d_]{3,9}|[^\W\d_]{3,9}[. ]+\d{1,2})[., -]+(?:19|20)\d\d",
     )
+)
+TIME_OF_DAY = re.compile(
+    r"(?i)(?<![0-9:])([0-2]?[0-9]):([0-5][0-9])(?::([0-5][0-9])(?:[.,:]([0-9]{1,6})[0-9]*)?)?(?![0-9:])(?:\s*([ap])m\b)?"
 )
 (_FREQUENCY_KEY,) = sentences("frequency_key")
 (_AMPLITUDE_KEY,) = sentences("amplitude_key")
@@ -442,6 +445,16 @@ def _value(number: str, decimal: str | None) -> float | None:
 def contradicts(one: float, other: float, limits: tuple[float, float] = _AGREE) -> bool:
     """Tell if a nominal and a measured current [A] contradict; a dash before a number may be a sign or none."""
     return abs(abs(one) - abs(other)) > limits[0] + limits[1] * min(abs(one), abs(other))
+
+
+def time_in(text: str) -> time | None:
+    """Return the first time of day that a text states; None if it states none."""
+    match = TIME_OF_DAY.search(text)
+    hour = int(match[1]) if match else 24
+    hour = hour % 12 + 12 * (match[5] in "pP") if match and match[5] else hour
+    if match is None or hour > 23:
+        return None
+    return time(hour, int(match[2]), int(match[3] or 0), int((match[4] or "0").ljust(6, "0")))
 
 
 def day_in(text: str) -> tuple[str, str] | None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from datetime import time as clock
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,7 @@ from mrdamper.physics.motion.measured import smooth
 from mrdamper.rig_files import coil_current
 from mrdamper.rig_files.column_names import DIMENSION, Unit, role_of, words
 from mrdamper.rig_files.columns import Assigned, assign, index_of_samples, noted_columns, rate_of
-from mrdamper.rig_files.conditions import day_in, stated_motion, stated_quantities
+from mrdamper.rig_files.conditions import day_in, stated_motion, stated_quantities, time_in
 from mrdamper.rig_files.mapping.clocks import past_midnight, refuse_two_rates
 from mrdamper.rig_files.mapping.proposals import integral
 from mrdamper.rig_files.parts import stretches_of_time
@@ -38,9 +37,6 @@ _MOST_HEAD_LINES = 20
 _LENIENT = ("acceleration", "voltage", "temperature", "pressure")  # a damaged cell there costs the channel, not the run
 _DATES, _TIMES = words("date_line"), words("time_of_day")
 _KEYED = re.compile(r"^[\W_]*(?P<key>[^\W\d_][\w ./-]{0,40}?)[\"' ]*[:=;,\t]+[\"' ]*(?P<value>\S.{0,60})")
-_TIME = re.compile(
-    r"(?i)(?<![\d:])(?P<hour>\d{1,2}):(?P<minute>\d\d)(?::(?P<second>\d\d))?(?:[.,]\d+)?\s*(?P<half>[ap]m)?"
-)
 
 
 def _tests_of(channels: dict[str, Floats], profile: Profile) -> tuple[list[slice], list[Finding]]:
@@ -328,23 +324,10 @@ def recording_time(lines: Iterable[str]) -> dict[str, str]:
         if key in _DATES and (day := day_in(value)):
             days[day[0]] = day[1]
         if key in _DATES or key in _TIMES:
-            times |= dict.fromkeys(filter(None, [_time_in(value)]))
+            times |= {} if (moment := time_in(value)) is None else {moment.isoformat("seconds"): None}
     if len(days) != 1:
         return {}
     ((iso, written),) = days.items()
     if not iso[0].isdigit():
         return {"session": written}
     return {"recorded_at": f"{iso}T{next(iter(times))}" if len(times) == 1 else iso}
-
-
-def _time_in(text: str) -> str | None:
-    match = _TIME.search(text)
-    if match is None:
-        return None
-    hour = int(match["hour"])
-    if match["half"]:
-        hour = hour % 12 + 12 * (match["half"].casefold() == "pm")
-    try:
-        return clock(hour, int(match["minute"]), int(match["second"] or 0)).isoformat()
-    except ValueError:
-        return None

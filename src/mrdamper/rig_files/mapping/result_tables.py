@@ -17,7 +17,6 @@ from mrdamper.rig_files.mapping.results import (
     MOST_LINES,
     NUMBER,
     SEPARATORS,
-    TIME_OF_DAY,
     Results,
     rows_below_heads,
 )
@@ -61,7 +60,7 @@ def _results_in(lines: tuple[str, ...]) -> Results | None:
 
 def _log_by_clock(lines: Sequence[str]) -> Results | None:
     """Return the lines of a log that begin with a time of day and state one current: 14:03 0.5 A."""
-    timed = [(match[0], line[match.end() :].strip()) for line in lines if (match := TIME_OF_DAY.match(line))]
+    timed = [(match[0], line[match.end() :].strip()) for line in lines if (match := conditions.TIME_OF_DAY.match(line))]
     rows = [(clock, of[0], text) for clock, text in timed if len(of := currents_in(text)) == 1]
     cells = tuple((clock, text) for clock, _, text in rows)
     table = Results(tuple(of for _, of, _ in rows), cells, "a line for each test", ("", "remark"))

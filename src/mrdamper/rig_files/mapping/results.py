@@ -23,7 +23,6 @@ SEPARATORS = ("\t", ";", ",", "|", "  ")  # the last: two spaces or more
 NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:[.,][0-9]+)?|[.,][0-9]+)")
 MOST_LINES, LONGEST_LINE = 4000, 2000
 _LABELLED = re.compile(r"(?<![^\W\d_])([^\W\d_]+)[ _.-]?([0-9]+)")
-TIME_OF_DAY = re.compile(r"(?<![0-9:])([0-2]?[0-9]):([0-5][0-9])(?::([0-5][0-9](?:\.[0-9]+)?))?(?![0-9:])")
 _FEWEST_DURING, _DAY_S = 3, 86_400  # rows of a log during a test; of a day [s]
 _STARTS, _ENDS, _ROWS = words("start"), words("end"), words("row")
 COUNTED = words("run") | words("run_number") | words("table_file")  # what the number in a test's name may be
@@ -291,7 +290,7 @@ def _names(texts: Iterable[str]) -> tuple[set[str], set[str]]:
     whole, numbers = set[str](), set[str]()
     for text in texts:
         bare = text.strip().strip('"').strip()
-        if TIME_OF_DAY.fullmatch(bare):
+        if conditions.TIME_OF_DAY.fullmatch(bare):
             continue
         for part in (bare, *re.split(r"[:=;,\t/]", bare)):
             part = part.strip().strip('"').strip()
@@ -313,11 +312,11 @@ def _key(text: str) -> str:
 
 def _moment(text: str) -> tuple[int, float] | None:
     """Return the day, 0 where none is stated, and the time of day [s]; None if there is none, or the day is unclear."""
-    match, (iso, _) = TIME_OF_DAY.search(text), conditions.day_in(text) or ("", "")
-    if match is None or iso[:1] == "?":
+    clock, (iso, _) = conditions.time_in(text), conditions.day_in(text) or ("", "")
+    if clock is None or iso[:1] == "?":
         return None
-    hour, minute, second = (float(part or 0) for part in match.groups())
-    return date.fromisoformat(iso).toordinal() if iso else 0, 3600 * hour + 60 * minute + second
+    seconds = 3600 * clock.hour + 60 * clock.minute + clock.second + 1e-6 * clock.microsecond
+    return date.fromisoformat(iso).toordinal() if iso else 0, seconds
 
 
 def _group_names(text: str) -> set[str]:
