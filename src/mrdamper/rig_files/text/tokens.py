@@ -13,7 +13,7 @@ import re
 import unicodedata
 from collections import Counter
 from collections.abc import Sequence
-from datetime import date
+from datetime import datetime
 from functools import lru_cache
 
 from mrdamper.rig_files.column_names import TABLES, is_unit, words
@@ -114,12 +114,12 @@ def stamp(token: str) -> tuple[int, bool] | None:
         if not 1 <= int(hour) <= 12:
             return None
         hour = int(hour) % 12 + 12 * (half.upper() == "PM")
-    if int(hour) > 23 or int(minute) > 59 or int(second) > 59:
+    try:
+        moment = datetime(int(year or 1), int(month or 1), int(day or 1), int(hour), int(minute), int(second))
+    except ValueError:
         return None
-    days = _day(year, month, day) if year else 0
-    if days is None:
-        return None
-    seconds = ((days * 24 + int(hour)) * 60 + int(minute)) * 60 + int(second)
+    days = moment.toordinal() if year else 0
+    seconds = ((days * 24 + moment.hour) * 60 + moment.minute) * 60 + moment.second
     if zone and zone not in "Zz":
         digits = zone[1:].replace(":", "")
         if int(digits[:2]) > 23 or int(digits[2:]) > 59:
@@ -127,14 +127,6 @@ def stamp(token: str) -> tuple[int, bool] | None:
         offset = 3600 * int(digits[:2]) + 60 * int(digits[2:])
         seconds -= offset if zone[0] == "+" else -offset
     return seconds * 10**9 + int((fraction or thousandths or "0").ljust(9, "0")), zone is not None
-
-
-@lru_cache(maxsize=64)
-def _day(year: str, month: str, day: str) -> int | None:
-    try:
-        return date(int(year), int(month), int(day)).toordinal()
-    except ValueError:
-        return None
 
 
 def with_notes_beside(
