@@ -162,9 +162,10 @@ def load_motion(path: str | Path, current: float | None = None) -> Run:
         raise ColumnError("no current", where=str(path), remedy="give --current A, or a column current_A")
     time = columns["time_s"]
     steps = np.diff(time)
-    wide = np.flatnonzero(steps > 5 * np.median(steps)) if steps.size else ()
-    if len(wide):
-        problem = f"a gap of {number(steps[wide[0]])} s after {time[wide[0]]:.6g} s"
+    wide = steps > 5 * np.median(steps) if steps.size else np.zeros(0, dtype=bool)
+    if wide.any():
+        at = int(np.argmax(wide))
+        problem = f"a gap of {number(steps[at])} s after {time[at]:.6g} s"
         remedy = "predict each part separately: the damper's state is unknown after a gap"
         raise RunError(problem, where=str(path), remedy=remedy, code="E_TIME_GAP")
     return Run(

@@ -60,8 +60,8 @@ def guarded_tables(source: base.Source, reader: base.Reader, form: FileForm) -> 
             if "missing" in answer:
                 raise MissingExtraError(answer["missing"], where=source.name, remedy=answer["remedy"])
             CombinedError.raise_from(
-                (base.NoTableError if wrong.pop("no_table") else base.RigFileError)(file=source.name, **wrong)
-                for wrong in answer.get("wrong", ())
+                (base.NoTableError if no_table else base.RigFileError)(file=source.name, **wrong)
+                for wrong, no_table in zip(answer.get("wrong", ()), answer.get("no_table", ()), strict=True)
             )
             return answer
 
@@ -75,14 +75,11 @@ def guarded_tables(source: base.Source, reader: base.Reader, form: FileForm) -> 
             answer = ask({"table": index, "words": column})
             return base.Words(sandbox.receive(answer["size"]).astype(np.int32), tuple(answer["labels"]))
 
-        tables = ask({**request, **limits, "form": form.model_dump()})["tables"]
-        says: list[dict[str, Any]] = [
-            {name: tuple(value) if isinstance(value, list) else value for name, value in table.items()}
-            for table in tables
-        ]
-        yield [
-            base.RawTable(source, read=partial(read, i), words=partial(words, i), **own) for i, own in enumerate(says)
-        ]
+        tables = []
+        for i, says in enumerate(ask({**request, **limits, "form": form.model_dump()})["tables"]):
+            own: dict[str, Any] = {key: tuple(of) if isinstance(of, list) else of for key, of in says.items()}
+            tables.append(base.RawTable(source, read=partial(read, i), words=partial(words, i), **own))
+        yield tables
 
 
 class _Sandbox(Child):
@@ -108,11 +105,6 @@ class _Sandbox(Child):
                 self.kill()
                 return
 
-    def prepare(self, reader: str) -> None:
-        """Load a reader's library while nobody waits."""
-        with contextlib.suppress(OSError):
-            self.say({"prepare": reader})
-
     def receive(self, size: int) -> np.ndarray:
         """Read the numbers that follow an answer."""
         try:
@@ -134,7 +126,8 @@ def taken(reader: str) -> Iterator[_Sandbox]:
         finally:
             if not sandbox.alive:
                 _CHILDREN[process] = _Sandbox()
-                _CHILDREN[process].prepare(reader)
+                with contextlib.suppress(OSError):  # it loads the reader's library while nobody waits
+                    _CHILDREN[process].say({"prepare": reader})
 
 
 def _sleeps(pid: int) -> bool:

@@ -46,8 +46,7 @@ def serve() -> None:
             except (RigFileError, CombinedError) as error:
                 errors = getattr(error, "errors", (error,))
                 wrong = [{name: getattr(one, name) for name in _TOLD} for one in errors]
-                kinds = [{"no_table": isinstance(one, NoTableError)} for one in errors]
-                send(replies, {"wrong": [one | kind for one, kind in zip(wrong, kinds, strict=True)]})
+                send(replies, {"wrong": wrong, "no_table": [isinstance(one, NoTableError) for one in errors]})
             except MemoryError:
                 os._exit(3)
 

@@ -167,21 +167,12 @@ def _of_channels(line: str) -> str:
 
 def with_description(table: RawTable, path: Path, profile: Profile) -> RawTable:
     """Return the table with what the text or structure of its name, or the only other file of its folder, states."""
-    other = _only_other(path)
-    other = other if other and _may_describe(other, path) and not profile.leaves_out(*other.parts) else None
-    beside = [*(path.with_suffix(suffix) for suffix in (*_NAMED, *_TEXTS)), path.parent / _HYDRA]
+    beside = [*(path.with_suffix(suffix) for suffix in (*_NAMED, *_TEXTS)), path.parent / _HYDRA, *_only_other(path)]
     named = [p for p in beside if p != path and p.is_file() and not profile.leaves_out(*p.parts)]
-    named = [p for p in (*named, *([other] if other else ())) if p.suffix.lower() in _NAMED or is_description(p)]
+    named = [p for p in named if p.suffix.lower() in _NAMED or is_description(p)]
     lines = short_lines(named[0]) if named else packaged_lines(path)
     lines = [*lines, *_head_in_yaml(table.remarks)]
     return replace(table, remarks=(*table.remarks, *lines))
-
-
-def _may_describe(other: Path, path: Path) -> bool:
-    """Tell if a name may be that of the description of a record: meta.xml, run1_info.json; no run2.json of run1.csv."""
-    if other.suffix.lower() in _NAMED:
-        return _GENERAL.fullmatch(other.stem.removeprefix(path.stem).strip(" ._-")) is not None
-    return other.stem == path.stem or len({re.sub("[0-9]+", "0", p.stem) for p in (other, path)}) > 1
 
 
 def is_description(path: Path) -> bool:
@@ -194,15 +185,19 @@ def is_description(path: Path) -> bool:
     return len(listed) > 1 or bool(stated_by_lines(lines, "."))
 
 
-def _only_other(path: Path) -> Path | None:
-    """Return the only other file of a file's folder; None if there is none, or several."""
-    try:
-        with os.scandir(path.parent) as folder:  # not read to its end: it may hold thousands of files
-            visible = (file.name for file in folder if not file.name.startswith(".") and file.name != path.name)
-            others = [path.with_name(name) for name in islice(visible, 2)]
-    except OSError:
-        return None
-    return others[0] if len(others) == 1 else None
+def _only_other(path: Path) -> list[Path]:
+    """Return the only other file of a file's folder, if its name may be that of a description of the record.
+
+    Thus meta.xml or run1_info.json, but no run2.json of run1.csv.
+    """
+    others = list[Path]()
+    with suppress(OSError), os.scandir(path.parent) as folder:  # not read to its end: it may hold thousands of files
+        visible = (file.name for file in folder if not file.name.startswith(".") and file.name != path.name)
+        others = [path.with_name(name) for name in islice(visible, 2)]
+    if len(others) == 1 and others[0].suffix.lower() in _NAMED:
+        return others if _GENERAL.fullmatch(others[0].stem.removeprefix(path.stem).strip(" ._-")) else []
+    alike = {re.sub("[0-9]+", "0", p.stem) for p in (*others, path)}
+    return others if len(others) == 1 and (others[0].stem == path.stem or len(alike) > 1) else []
 
 
 def short_lines(path: Path) -> list[str]:

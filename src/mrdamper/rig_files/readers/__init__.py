@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -41,17 +41,16 @@ def raw_tables(path: str | Path, form: FileForm | None = None) -> Iterator[list[
     Raises `RigFileError` if the file is damaged, of no known format, of another format than its
     name says, or can be read in more than one way.
     """
-    with opened(Path(path)) as source:
+    form = form or FileForm()
+    with opened(Path(path)) as source, ExitStack() as stack:
         reader = reader_of(source)
-        if not reader.library:
-            try:
-                tables = reader.tables(source, form or FileForm())
-            except RigFileError as error:  # of an array, which knows no file
-                raise error if error.file else source.refuse(error.code, error.found, error.remedy) from None
-            yield _renamed(tables, form)
-            return
-        with guarded_tables(source, reader, form or FileForm()) as tables:
-            yield _renamed(tables, form)
+        try:
+            guarded = stack.enter_context(guarded_tables(source, reader, form)) if reader.library else None
+            tables = reader.tables(source, form) if guarded is None else guarded
+        except RigFileError as error:  # of an array, which knows no file
+            raise error if error.file else source.refuse(error.code, error.found, error.remedy) from None
+        names, width = form.names, len(form.names)  # that a profile gives the columns, whatever the format
+        yield [replace(t, names=names) if len(t.names) == width and t.names != names else t for t in tables]
 
 
 def ask_tables(path: str | Path, ask: Callable[[list[RawTable]], T], otherwise: T, form: FileForm | None = None) -> T:
@@ -61,14 +60,6 @@ def ask_tables(path: str | Path, ask: Callable[[list[RawTable]], T], otherwise: 
             return ask(tables)
     except InputError:
         return otherwise
-
-
-def _renamed(tables: list[RawTable], form: FileForm | None) -> list[RawTable]:
-    """Tables with the names a profile gives their columns, whatever the format."""
-    if form is None or not form.names:
-        return tables
-    width = len(form.names)
-    return [replace(t, names=form.names) if len(t.names) == width and t.names != form.names else t for t in tables]
 
 
 def reader_of(source: Source) -> Reader:

@@ -103,11 +103,7 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
     trailing |= header is not None and separator != SPACES and _names_notes(cells_of(lines[header], separator), width)
     if len(names) != width:
         raise _mismatch(source, separator, len(names), width, first, lines)
-    if unit_row is not None:
-        units = _cells(lines[unit_row], separator, width)
-    else:  # that of the only column may stand in a line above
-        alone = [match[1] for line in lines[:first] if width == 1 and (match := _UNIT_OF_ALL.match(line))]
-        units = tuple(alone) if len(alone) == 1 and is_unit(alone[0]) else ("",) * width
+    units = _cells(lines[unit_row], separator, width) if unit_row is not None else _unit_alone(lines[:first], width)
     units = ("" if units[0].casefold() in UNIT_KEYS else units[0], *units[1:])
     columns = [[row[i] for row in rows if len(row) > i] for i in range(width)]
     names = tuple("" if n == X_VALUE and not any(c) else n for n, c in zip(names, columns, strict=True))
@@ -137,6 +133,12 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         behind,
         form.decimal is not None,
     )
+
+
+def _unit_alone(above: Sequence[str], width: int) -> tuple[str, ...]:
+    """Units of columns without a row of units: that of the only column may stand in a line above."""
+    alone = [match[1] for line in above if width == 1 and (match := _UNIT_OF_ALL.match(line))]
+    return tuple(alone) if len(alone) == 1 and is_unit(alone[0]) else ("",) * width
 
 
 def _with_name_of_numbers(above: Sequence[str], separator: str, width: int) -> list[str]:
@@ -178,35 +180,25 @@ def _without_keys(above: Sequence[str], separator: str) -> Iterator[str]:
 def _names_and_titles(
     lines: Sequence[str], header: int, below: Sequence[str], separator: str, width: int
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names of columns, of several levels of headings and of an index alone below them, and the titles."""
+    """Return the names of columns, of several levels of headings and of an index alone below them, and the titles.
+
+    The last line of several levels names the index alone, a line above it the channels, another their conditions.
+    """
     names = _cells(lines[header], separator, width)
     alone = [cells[0] for line in below if len(cells := _cells(line, separator, width)) == width and not any(cells[1:])]
     if len(alone) == 1 and alone[0] and not _roles(names[:1]):  # pandas puts the name of the index there
         names = (alone[0], *names[1:])
-    return _with_levels(names, _levels(lines[:header], separator, width))
-
-
-def _levels(above: Sequence[str], separator: str, width: int) -> list[tuple[str, ...]]:
-    """Return the lines of cells right above the names of columns, one cell a column."""
-    levels: list[tuple[str, ...]] = []
-    for line in reversed(above[-_MOST_LEVELS:]):
+    empty = [i for i, name in enumerate(names) if not name]
+    if len(_roles(names)) >= TELLING or len(empty) < TELLING:
+        return names, ()
+    levels: list[tuple[str, ...]] = []  # right above the names, one cell a column
+    for line in reversed(lines[:header][-_MOST_LEVELS:]):
         if not line.strip() or is_comment(line) or separator == SPACES:
             break
         cells = cells_of(line, separator)
         if len(cells) != width or sum(map(bool, cells)) < 2:
             break
         levels.append(tuple(cell.strip('"') for cell in cells))
-    return levels
-
-
-def _with_levels(names: tuple[str, ...], levels: list[tuple[str, ...]]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names of columns of a table with several levels of headings, and the titles of the other level.
-
-    The last line names the index alone, a line above it the channels, another their conditions.
-    """
-    empty = [i for i, name in enumerate(names) if not name]
-    if len(_roles(names)) >= TELLING or len(empty) < TELLING:
-        return names, ()
     telling = [cells for cells in levels if len(_roles([cells[i] for i in empty])) >= TELLING]
     if len(telling) != 1:
         return names, ()
