@@ -14,11 +14,13 @@ from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.models.kwok import Kwok
 from mrdamper.models.spencer import Spencer
 from mrdamper.physics.hysteresis import Shape, follow
-from mrdamper.physics.hysteresis.batch import batch_cost, follow_alike
+from mrdamper.physics.hysteresis.batch import batch_cost, follow_alike, follow_with_slope
+from mrdamper.physics.hysteresis.response import follow_one
 from mrdamper.physics.motion import Path, sine
 from mrdamper.statistics import linear
 from mrdamper.statistics.levenberg_marquardt import least_squares
 from mrdamper.statistics.linear import FixedColumns
+from mrdamper.statistics.scalar_least_squares import least_squares_in_one
 from mrdamper.statistics.stop_reason import StopReason
 
 X = 0.02
@@ -55,6 +57,18 @@ def test_shapes_at_once_are_the_states_of_each(name, n):
     for rho in (-0.6, 0.0, 0.4):
         expected = [follow(Shape(float(k), rho, n), PATHS[name]) for k in kappa]
         np.testing.assert_allclose(follow_alike(n, rho, kappa, PATHS[name]), expected, atol=1e-13)
+
+
+@pytest.mark.parametrize("n", [1.0, 2.0, 3.5])
+@pytest.mark.parametrize("rho", [-0.5, 0.0, 0.5])
+def test_slope_is_the_derivative_by_the_length(n, rho):
+    for name in ("sine", "random walk"):
+        for kappa in (2 / X, 20 / X, 200 / X):
+            state, slope = follow_with_slope(kappa, rho, n, PATHS[name], slice(50, None))
+            np.testing.assert_array_equal(state, follow_one(kappa, rho, n, PATHS[name], slice(50, None)))
+            up, down = (follow(Shape(kappa * np.exp(h), rho, n), PATHS[name])[50:] for h in (1e-6, -1e-6))
+            # A central difference is good to 1e-9; at the few samples within its step of a kink it is not.
+            assert np.quantile(np.abs((up - down) / 2e-6 - slope), 0.99) < 1e-7
 
 
 @pytest.mark.parametrize("n", [1.0, 2.0, 1.6])
@@ -172,20 +186,25 @@ def test_the_declared_column_is_the_only_one_the_search_moves(name):
         np.testing.assert_allclose(table, tables[0], rtol=1e-9)
 
 
-def test_learnt_curvature_matches_gauss_newton_and_keeps_its_bounds():
+def test_one_number_search_matches_levenberg_marquardt_and_keeps_its_bounds():
     t = np.linspace(0, 3, 200)
     measured = np.exp(-1.3 * t) + 0.3 * np.sin(9 * t)  # much residual remains: Gauss–Newton alone is slow
 
-    def found(highest, curved):
-        box = np.zeros(1), np.full(1, highest)
-        return least_squares(lambda u: np.exp(-u[0] * t) - measured, np.array([0.3]), *box, curved=curved)
+    def evaluate(u):
+        return np.exp(-u * t) - measured, -t * np.exp(-u * t)
 
-    slow, curved = found(5.0, False), found(5.0, True)
+    quick = least_squares_in_one(evaluate, 0.3, 0.0, 5.0)
+    slow = least_squares(lambda u: evaluate(float(u[0]))[0], np.array([0.3]), np.zeros(1), np.full(1, 5.0))
+    curved = least_squares(
+        lambda u: evaluate(float(u[0]))[0], np.array([0.3]), np.zeros(1), np.full(1, 5.0), curved=True
+    )
+    assert quick.cost <= slow.cost * (1 + 1e-9)
     assert curved.cost <= slow.cost * (1 + 1e-9)
-    assert curved.point[0] == pytest.approx(slow.point[0], rel=1e-4)
-    bounded = found(1.0, True)
+    assert quick.point[0] == pytest.approx(slow.point[0], rel=1e-4)
+    bounded = least_squares_in_one(evaluate, 0.3, 0.0, 1.0)
     assert bounded.point[0] == 1.0
     assert bounded.ending is StopReason.AT_BOUNDS
+    assert least_squares_in_one(lambda u: None, 0.3, 0.0, 1.0) is None
 
 
 def test_learnt_curvature_converges_where_gauss_newton_creeps():

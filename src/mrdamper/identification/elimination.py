@@ -20,6 +20,7 @@ from mrdamper.errors import ParameterError
 from mrdamper.identification.columns import bounds_of, linear_table
 from mrdamper.identification.problem import DELAY, Problem
 from mrdamper.models import Model, Scale, SearchAxis
+from mrdamper.physics.hysteresis.batch import follow_with_slope
 from mrdamper.physics.hysteresis.response import follow_one
 from mrdamper.statistics.linear import FixedColumns
 
@@ -53,12 +54,60 @@ class Elimination:
         del base  # kept for long records, too
         return FixedColumns.of(columns, right)
 
+    @cached_property
+    def _fixed(self) -> FixedColumns | None:
+        """The constant columns; None where they depend on each other."""
+        return self.fixed_columns if self.fixed_columns.independent else None
+
+    @cached_property
+    def _bounds(self) -> tuple[Floats, Floats]:
+        return bounds_of(self.kind.others)
+
     def residual(self, point: Mapping[str, float]) -> Floats | None:
-        """Residual at a point of the search; None where a bound or dependent columns need the general method."""
-        fixed = self.fixed_columns
-        if not fixed.independent:
+        """Residual at a point of the search; None where the general method is needed."""
+        fixed = self._fixed
+        if fixed is None or (fit := self._fit(fixed, self._state(point))) is None:
             return None
-        state = self._state(point)  # its size has no effect on the residual
+        size, beside, _ = fit
+        return size * beside - fixed.rest
+
+    def residual_and_slope(self, length: float) -> tuple[Floats, Floats] | None:
+        """Residual at a yield displacement that is searched alone, and its derivative with ln length.
+
+        [Golub and Pereyra 1973]
+        """
+        shape, fixed = self.kind.shape({_LENGTH: length}), self._fixed
+        if fixed is None or shape is None:
+            return None
+        state, change = follow_with_slope(*shape, self.problem.motion.path, self.problem.scored)
+        if (fit := self._fit(fixed, state)) is None:
+            return None
+        size, beside, _ = fit
+        np.negative(change, out=change)  # all in place, because these may be long
+        moved = fixed.basis @ (change @ fixed.basis)
+        np.subtract(change, moved, out=moved)
+        growth = (float(moved @ fixed.rest) - 2 * size * float(moved @ beside)) / float(beside @ beside)
+        residual = size * beside
+        residual -= fixed.rest
+        moved *= size
+        beside *= growth
+        moved += beside
+        return residual, moved
+
+    def solved(self, point: Mapping[str, float]) -> Model | None:
+        """Model at a point of the search; None where the general method is needed."""
+        if self._fixed is None or (fit := self._fit(self._fixed, self._state(point))) is None:
+            return None
+        shape, (size, _, others) = self.kind.shape(point), fit
+        values = dict(zip((i.name for i in self.kind.others), others.tolist(), strict=True))
+        values[self.kind.state.name] = size * shape[0] if shape else size  # the state is zeta/kappa
+        return self.problem.model_type.build({**self.problem.fixed, **point, **values})
+
+    def _fit(self, fixed: FixedColumns, state: Floats) -> tuple[float, Floats, Floats] | None:
+        """Best coefficient of a state, the part of it beside the constant columns, and their coefficients.
+
+        None where a bound or dependence interferes.
+        """
         along = state @ fixed.basis
         beside = fixed.basis @ along
         np.subtract(state, beside, out=beside)
@@ -70,18 +119,18 @@ class Elimination:
         (low, high), (lower, upper) = self.kind.state.bounds, self._bounds
         if not (low <= size <= high and ((others >= lower) & (others <= upper)).all()):
             return None
-        return size * beside - fixed.rest
-
-    @cached_property
-    def _bounds(self) -> tuple[Floats, Floats]:
-        return bounds_of(self.kind.others)
+        return size, beside, others
 
     def _state(self, point: Mapping[str, float]) -> Floats:
-        problem, shape = self.problem, self.kind.shape(point)
-        if shape is not None:
-            return follow_one(*shape, problem.motion.path, problem.scored)
+        # Its size has no effect on the residual.
+        shape = self.kind.shape(point)
+        if shape is None:
+            return self._bare(point).state(self.problem.motion)[self.problem.scored]
+        return follow_one(*shape, self.problem.motion.path, self.problem.scored)
+
+    def _bare(self, point: Mapping[str, float]) -> Model:
         zero = {i.name: 0.0 for i in (*self.kind.others, self.kind.state)}
-        return problem.model_type.build({**problem.fixed, **point, **zero}).state(problem.motion)[problem.scored]
+        return self.problem.model_type.build({**self.problem.fixed, **point, **zero})
 
 
 @dataclass(frozen=True)

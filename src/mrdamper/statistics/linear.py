@@ -208,7 +208,7 @@ class FixedColumns:
         along = basis.T @ right
         return cls(basis, triangle, scale, along, right - basis @ along)
 
-    @cached_property
+    @property
     def independent(self) -> bool:
         """True if no column is explained by the others."""
         pivots = np.abs(np.diag(self.triangle))

@@ -28,6 +28,7 @@ from mrdamper.physics.hysteresis.batch import batch_cost
 from mrdamper.physics.motion import Path
 from mrdamper.statistics.levenberg_marquardt import Minimum, forward_differences, least_squares
 from mrdamper.statistics.linear import FixedColumns, on_one_blas_thread, project_out_columns, solve_bounded
+from mrdamper.statistics.scalar_least_squares import least_squares_in_one
 from mrdamper.statistics.stop_reason import StopReason
 
 _GRID_SAMPLES = 1500  # the grid only has to find the region of the minimum
@@ -64,11 +65,14 @@ class Projection(Method):
         minima = [(start, _refined(problem, axes, elimination, start)) for start in starts]
         start, best = min(minima, key=lambda pair: pair[1].cost)
         end = values_at(axes, best.point)
-        projected = _project(problem, end)
+        model, held = (elimination and elimination.solved(end)), ()
+        if model is None:
+            projected = _project(problem, end)
+            model, held = projected.model, projected.at_bounds
         return Solution(
-            model=projected.model,
+            model=model,
             delay=end.get(DELAY, 0.0),
-            at_bounds=(*projected.at_bounds, *names_at_bounds(axes, best.point)),
+            at_bounds=(*held, *names_at_bounds(axes, best.point)),
             start=values_at(axes, start),
             end=end,
             evaluations=evaluated + sum(minimum.evaluations for _, minimum in minima),
@@ -125,6 +129,12 @@ def _refined(problem: Problem, axes: tuple[SearchAxis, ...], elimination: Elimin
     names = [axis.name for axis in axes]
     lower, upper = box_of(axes)
     shaped = elimination is not None and elimination.kind.has_shape
+    if elimination and shaped and len(axes) == 1:
+        (axis,), slope = axes, elimination.residual_and_slope
+        quick = least_squares_in_one(lambda u: slope(axis.value(u)), float(start[0]), lower[0], upper[0])
+        if quick is not None:
+            return quick
+
     if problem.model_type.integrated and DELAY not in names:
         return _refined_by_tangents(problem, axes, start, lower, upper)
 

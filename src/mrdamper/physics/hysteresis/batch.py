@@ -14,11 +14,12 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.physics.hysteresis.master_curve import master_curve
-from mrdamper.physics.hysteresis.response import on_curve
+from mrdamper.physics.hysteresis.response import advance, on_curve, state_at
 from mrdamper.physics.hysteresis.shape import Shape
 from mrdamper.physics.motion.path import Path
 from mrdamper.statistics.linear import FixedColumns
 
+_BLOCK = 20_000  # samples whose states are computed at a time
 _MAX_STATES = 2**17  # states held at a time
 
 
@@ -57,6 +58,45 @@ def products(path: Path, fixed: FixedColumns, shapes: Shape) -> Products:
             sums[part, -2] = zeta @ fixed.rest
             sums[part, -1] = np.einsum("pn,pn->p", zeta, zeta)
     return Products(sums[:, :-2], sums[:, -2], sums[:, -1])
+
+
+def follow_with_slope(kappa: float, rho: float, n: float, path: Path, part: slice) -> tuple[Floats, Floats]:
+    """States as `follow_one`, and their derivative with respect to ln kappa.
+
+    Along a stroke the state is a function of kappa times the distance, shifted by where the stroke
+    began; so its derivative is the rate there times that distance and the derivative of the shift.
+    """
+    curve = master_curve(n)
+    w, slope = 0.0, 0.0
+    starts, shifts = [0.0], [0.0]
+    full = (curve.release_distance(1.0, rho, math) + curve.full) / kappa
+    for length in path.lengths:
+        if w == -1.0 and length >= full:
+            slope = 0.0
+        else:
+            end = advance(curve, rho, w, kappa * length)
+            slope = -_rate(end, rho, n) * (kappa * length + shifts[-1])
+            w = -end
+        starts.append(w)
+        shifts.append(slope / _rate(w, rho, n) if slope else 0.0)
+    strokes, distances, directions = path.stroke[part], path.distance[part], path.direction[part]
+    first, later = np.array(starts), np.array(shifts)
+    states, slopes = np.empty((2, distances.size))
+    for begin in range(0, distances.size, _BLOCK):  # of which all arrays stay in the processor's cache
+        rows = slice(begin, begin + _BLOCK)
+        stroke, phi, direction = strokes[rows], kappa * distances[rows], directions[rows]
+        state = state_at(curve, rho, first, stroke, phi)
+        size = np.abs(state)
+        rate = 1.0 - (size if n == 1 else size * size if n == 2 else size**n)
+        if rho != 1.0:
+            before = np.flatnonzero(state < 0)
+            rate[before] = (1.0 - rho) + rho * rate[before]
+        states[rows], slopes[rows] = direction * state, direction * (rate * (phi + later[stroke]))
+    return states, slopes
+
+
+def _rate(w: float, rho: float, n: float) -> float:
+    return 1.0 - w**n if w >= 0 else 1.0 - rho * (-w) ** n
 
 
 def follow_alike(n: float, rho: float, kappa: Floats, path: Path) -> Floats:
