@@ -5,7 +5,7 @@
 #define MOST_SWEEPS 50
 #define TOLERANCE 1e-8
 
-static int search(whole j, const real *p, const real *d, const real *memory, real *later, real *kept, real x0,
+static int search(whole j, const real *p, const real *d, const real *memory, real *later, real x0,
     real u0, real f0, real drift, real free, real compliance, real current, real dt, real *slope, real scale,
     real *force, real *flags)
 {
@@ -17,7 +17,7 @@ static int search(whole j, const real *p, const real *d, const real *memory, rea
     *flags = 0.0;
     for (k = 0; k < MOST_TRIES; k++) {
         real line, gap;
-        if (!evaluate(j, p, d, memory, later, kept, x0 + 0.5 * dt * (u + u0) + drift, u, (u - u0) / dt, current, dt, &f,
+        if (!evaluate(j, p, d, memory, later, x0 + 0.5 * dt * (u + u0) + drift, u, (u - u0) / dt, current, dt, &f,
                 flags) || !isfinite(f)) {
             *slope = s;
             return 0;
@@ -71,14 +71,10 @@ EXPORT whole walk(real dt, const whole *sizes, const real *const *in, real *cons
     real *memory = out[0], *cm = out[1], *slope = out[2], *scale = out[3], *currents = out[4];
     real *x = out[5], *v = out[6], *f = out[7], *flags = out[8], *later = work, *mean = later + remembered;
     real *free = mean + n, *signals = free + count, *held = signals + seeing + 1, *state = held + count;
-    real kept[KEPT];
     whole i, j, k, r, s;
     int sweep;
     memcpy(later, memory, sizeof(real) * (size_t)remembered);
     memcpy(held, currents, sizeof(real) * (size_t)count);
-    for (k = 0; k < KEPT; k++) {
-        kept[k] = NAN;
-    }
     for (i = 1; i < samples; i++) {
         const real *x_before = x + (i - 1) * n, *v_before = v + (i - 1) * n, *f_before = f + (i - 1) * count;
         real *x_now = x + i * n, *v_now = v + i * n, *f_now = f + i * count;
@@ -140,7 +136,7 @@ EXPORT whole walk(real dt, const whole *sizes, const real *const *in, real *cons
                         line -= G[j * count + k] * f_now[k];
                     }
                 }
-                if (!search(j, p, d, memory, later, kept, x0, u0, f_before[j], drift, line, G[j * count + j],
+                if (!search(j, p, d, memory, later, x0, u0, f_before[j], drift, line, G[j * count + j],
                         currents[i * count + j], dt, slope + j, scale[j], &force, flags + i * count + j)) {
                     return i;
                 }

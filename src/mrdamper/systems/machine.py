@@ -12,17 +12,15 @@ import numpy as np
 from mrdamper.systems.kernel import ElementParameters, LoopElement, interpreted_loop, slope_and_scale
 from mrdamper.tracing.compiled.cache import load
 from mrdamper.tracing.compiled.record import address
-from mrdamper.tracing.compiled.writer import PREAMBLE, ArrayWriter, functions
+from mrdamper.tracing.compiled.writer import PREAMBLE, functions
 
 _LOOP = Path(__file__).with_name("loop.c")
 _STEPS = 40  # steps over which a new library is compared with the interpreter
 _MAX_RELATIVE_DIFFERENCE = 1e-9  # relative difference allowed there
 
 _EVALUATE = """
-#define KEPT {kept}
-
-static int evaluate(whole j, const real *p, const real *d, const real *memory, real *later, real *kept, real x, real v,
-    real a, real current, real dt, real *force, real *flags)
+static int evaluate(whole j, const real *p, const real *d, const real *memory, real *later, real x, real v, real a,
+    real current, real dt, real *force, real *flags)
 {{
     const real u[5] = {{x, v, a, current, dt}};
     real out[2];
@@ -34,7 +32,7 @@ static int evaluate(whole j, const real *p, const real *d, const real *memory, r
 """
 _CASE = """    case {index}:
         memcpy(later + {m}, memory + {m}, {size} * sizeof(real));
-        if (!step_{program}(p + {p} + 2, d + {d}, later + {m}, u, out, kept + {kept})) {{
+        if (!step_{program}(p + {p} + 2, d + {d}, later + {m}, u, out)) {{
             return 0;
         }}
         *force = p[{p}] * out[0] + p[{p} + 1];
@@ -66,15 +64,13 @@ def _library(elements: tuple[LoopElement, ...], control: LoopElement | None) -> 
 def _source(elements: Sequence[LoopElement], control: LoopElement | None) -> str:
     programs = list({id(stage.program): stage.program for stage in elements}.values())
     places = {id(program): index for index, program in enumerate(programs)}
-    kept = [ArrayWriter(programs[places[id(e.program)]], keep=True).kept for e in elements]
-    sizes = ([2 + p, d, m, k] for (p, d, m), k in zip((e.sizes for e in elements), kept, strict=True))
-    begins = np.cumsum([[0, 0, 0, 0], *sizes], axis=0).tolist()
+    begins = np.cumsum([[0, 0, 0], *([2 + p, d, m] for p, d, m in (e.sizes for e in elements))], axis=0).tolist()
     cases = "".join(
-        _CASE.format(index=i, program=places[id(stage.program)], p=p, d=d, m=m, kept=k, size=len(stage.start))
-        for i, (stage, (p, d, m, k)) in enumerate(zip(elements, begins, strict=False))
+        _CASE.format(index=i, program=places[id(stage.program)], p=p, d=d, m=m, size=len(stage.start))
+        for i, (stage, (p, d, m)) in enumerate(zip(elements, begins, strict=False))
     )
-    text = PREAMBLE + "".join(functions(program, index, keep=True) for index, program in enumerate(programs))
-    text += _EVALUATE.format(cases=cases, kept=begins[-1][3] + 1)
+    text = PREAMBLE + "".join(functions(program, index) for index, program in enumerate(programs))
+    text += _EVALUATE.format(cases=cases)
     body = "return 1;"
     if control is not None:
         text += functions(control.program, len(programs))
