@@ -5,8 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mrdamper.dampers.random_effects import Draws, Effects, GainsAndOffsets, _nonnegative
-from mrdamper.statistics.linear import nonnegative_least_squares
+from mrdamper.dampers.random_effects import Draws, Effects, GainsAndOffsets
 
 PHASE = np.linspace(0.0, 2 * np.pi, 120, endpoint=False)
 FORCE = 100 * np.sin(PHASE)
@@ -342,13 +341,3 @@ def test_representative_draws_have_no_mean_and_the_mean_squares_of_all(count):
         assert len(chosen) == 16
         assert np.mean(moved[chosen], axis=0) / unit == pytest.approx(np.zeros(count), abs=0.2)
         assert np.mean(moved[chosen] ** 2, axis=0) == pytest.approx(unit**2, rel=0.25)
-
-
-@pytest.mark.parametrize("size", [1, 2, 4])
-def test_no_variance_is_negative_and_no_other_choice_of_them_leaves_less(size):
-    rng = np.random.default_rng(size)
-    tables = rng.uniform(0, 1, (50, size, size)) + np.eye(size)
-    rights = rng.standard_normal((50, size))
-    expected = [nonnegative_least_squares(*each)[0] for each in zip(tables, rights, strict=True)]
-    assert _nonnegative(tables, rights) == pytest.approx(np.array(expected), abs=1e-12)
-    assert _nonnegative(tables[:1], -np.abs(rights[:1])) == pytest.approx(0.0)

@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain, combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +21,7 @@ from mrdamper.dampers.concatenated_runs import MIN_ERROR_PP
 from mrdamper.dampers.run_residuals import RunResiduals
 from mrdamper.data import Floats, session_groups
 from mrdamper.data.arrays import blocks
+from mrdamper.statistics.linear import nonnegative_least_squares
 
 _MIN_RETAINED = 0.05  # share of a variance that the fit must have left in the residuals for it to be estimated
 _MAX_CONDITION = 100.0  # condition number of the equations; beyond, runs and sessions are not separated
@@ -67,21 +67,6 @@ class Draws:
             others = table[np.delete(chosen, at)].sum(axis=0)
             chosen[at] = np.argmin(np.sum((others + table) ** 2, axis=1))
         return chosen
-
-
-def _nonnegative(table: Floats, right: Floats) -> Floats:
-    """(D, C) coefficients of least squares of D square tables, none negative: the best of every choice of columns."""
-    best, least = np.zeros(right.shape), np.sum(right**2, axis=1)
-    columns = range(right.shape[1])
-    for chosen in map(list, chain.from_iterable(combinations(columns, k + 1) for k in columns)):
-        some: Floats = table[:, :, chosen]
-        turned = np.swapaxes(some, 1, 2)
-        trial = np.linalg.solve(turned @ some, turned @ right[:, :, None])
-        squares = np.sum((right - (some @ trial)[:, :, 0]) ** 2, axis=1)
-        better = (trial > 0).all(axis=(1, 2)) & (squares < least)
-        best[better] = 0.0
-        best[np.ix_(better, chosen)], least[better] = trial[better, :, 0], squares[better]
-    return best
 
 
 class GainsAndOffsets:
@@ -153,9 +138,9 @@ class GainsAndOffsets:
         table: Floats = table / size[:, :, None] / size[:, None, :]
         right: Floats = (forms - noise * by_noise) / size
         solved = np.linalg.solve(table, right[:, :, None])[:, :, 0].astype(float)
-        below = (solved < 0).any(axis=1)
         table = np.broadcast_to(table, (len(solved), *table.shape[1:]))
-        solved[below] = _nonnegative(table[below], right[below])
+        for i in np.flatnonzero((solved < 0).any(axis=1)):
+            solved[i] = nonnegative_least_squares(table[i], right[i])[0]
         return solved / size, inner
 
     def _iterated(self, shown: Floats, noise: float = 1.0) -> Floats:
