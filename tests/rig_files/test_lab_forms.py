@@ -9,7 +9,7 @@ import pytest
 from support.rig_files import tdms_bytes
 
 from mrdamper.errors import InputError
-from mrdamper.rig_files.columns import units_in
+from mrdamper.rig_files.column_names import units_in
 from mrdamper.rig_files.preview import guess_profile
 from mrdamper.rig_files.profile import parse_profile
 from mrdamper.rig_files.readers.arrays import unit_in

@@ -13,6 +13,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import files
+from itertools import pairwise
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -156,6 +157,8 @@ _RATE_GROUP = re.compile(r"\s+\d*\s*-\s*(?:default|fast|slow) sample rate", re.I
 _DEVICE = re.compile(r"\\[\w.-]{1,30}:[0-9]{1,3}$")  # F_rod\ES650:1
 _NUMBER = re.compile("(?<![0-9])(?:0|[1-9][0-9]*)$")
 _FUSED = re.compile(r"[ _.:-]+")
+_AROUND_UNITS = words("around_units")
+_NEXT = re.compile(r"[,;|\t()]| (?:and|und|et|y|e|oraz|och|og|и) ")  # between the units of two channels
 _SMALL = MappingProxyType({"a": "current", "n": "force"})  # units of one letter in names in small letters
 _BY_UNIT = MappingProxyType({"length": "displacement", "force": "force", "current": "current"})
 
@@ -288,6 +291,36 @@ def is_called(name: str, words: Collection[str]) -> bool:
     """Tell if a name is one of some words, alone or with a word for a number or a label: Run, Run No., damper ID."""
     own = {*words_of(split_name(name).name.casefold())}
     return not own.isdisjoint(words) and own <= {*words, *_LABELS}
+
+
+def units_in(line: str, names: Collection[str] = ()) -> list[tuple[str, str]]:
+    """Return the channels of which a line states the unit and nothing else, and the units: the force column is in N.
+
+    A letter stands for a channel only if it is one of some names of columns. Behind such a name other texts may stand:
+    x; displacement; cm; LVDT.
+    """
+    name, *others = (cell.strip() for cell in line.split("; "))
+    if name.casefold() in names and (role := role_of(name)) and sum(map(is_unit, others)) == 1:
+        unit = next(filter(is_unit, others))
+        return [(role, unit)] if split_name("", unit).dimension == DIMENSION[role] else []
+    line = re.sub(r"\(([^()]*)\)", lambda aside: aside[0] if is_unit(aside[1]) else "", line)
+    return [stated for sentence in line.split(". ") for stated in _units_in_sentence(sentence, names)]
+
+
+def _units_in_sentence(sentence: str, names: Collection[str]) -> list[tuple[str, str]]:
+    cells = [cell.strip(' `*#"') for cell in _NEXT.split(sentence)]
+    stated = []
+    for cell, behind in pairwise([*cells, ""]):
+        text = f"{cell} in {behind}" if is_unit(behind) else re.sub(r"\s*[:=]\s+", " in ", cell.rstrip("."))
+        header = split_name(text)
+        named = [word for word in words_of(header.name) if word.casefold() not in _AROUND_UNITS]
+        one = header.unit and len(named) == 1 and (len(named[0]) > 2 or named[0].casefold() in names)
+        role = role_of(named[0].removesuffix("s")) if one else None  # forces
+        if role and header.dimension == DIMENSION[role]:
+            stated.append((role, header.unit))
+        elif named and not is_unit(cell):
+            return []  # of a table, a figure or another file
+    return stated
 
 
 def names_compression(name: str) -> bool:

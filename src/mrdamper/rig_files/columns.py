@@ -6,7 +6,6 @@ import contextlib
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -26,11 +25,9 @@ _TOTAL = re.compile(r"total|absolut|gesamt|cumulat|kumul", re.IGNORECASE)
 _COUNTS = ("counts", *column_names.TABLES["unit_names"]["counts"])
 _PHASES = (frozenset("UVW"), frozenset("RST"), frozenset(("L1", "L2", "L3")))  # of a motor, at the end of a name
 _INDEX, _MEASURED = words("sample"), words("measured")
-_AROUND_UNITS = words("around_units")
 _TIMES = re.compile(r"(?i)(?<!\w)multipl(?:y|ie[ds]?|ier|iz|ic|ik)\w*")  # no multiple, no multiplexer
 _CONVERTER = re.compile(r"(?i)(?<![a-z])(?:adc|counts?|raw|cnts?)(?![a-z])")  # of a converter
 _FACTOR = re.compile(r"(?<![\w.,])[0-9]+(?:[.,][0-9]+)?(?!\w)")
-_NEXT = re.compile(r"[,;|\t()]| (?:and|und|et|y|e|oraz|och|og|и) ")  # between the units of two channels
 
 
 @dataclass(frozen=True, slots=True)
@@ -420,42 +417,12 @@ def _unit_problem(table: RawTable, role: str, column: int, unit: str) -> UnitErr
     return _refusal(UnitError, table, problem, remedy, "E_UNITS_DIMENSION")
 
 
-def units_in(line: str, names: Collection[str] = ()) -> list[tuple[str, str]]:
-    """Return the channels of which a line states the unit and nothing else, and the units: the force column is in N.
-
-    A letter stands for a channel only if it is one of some names of columns. Behind such a name other texts may stand:
-    x; displacement; cm; LVDT.
-    """
-    name, *others = (cell.strip() for cell in line.split("; "))
-    if name.casefold() in names and (role := column_names.role_of(name)) and sum(map(is_unit, others)) == 1:
-        unit = next(filter(is_unit, others))
-        return [(role, unit)] if split_name("", unit).dimension == DIMENSION[role] else []
-    line = re.sub(r"\(([^()]*)\)", lambda aside: aside[0] if is_unit(aside[1]) else "", line)
-    return [stated for sentence in line.split(". ") for stated in _units_in_sentence(sentence, names)]
-
-
-def _units_in_sentence(sentence: str, names: Collection[str]) -> list[tuple[str, str]]:
-    cells = [cell.strip(' `*#"') for cell in _NEXT.split(sentence)]
-    stated = []
-    for cell, behind in pairwise([*cells, ""]):
-        text = f"{cell} in {behind}" if is_unit(behind) else re.sub(r"\s*[:=]\s+", " in ", cell.rstrip("."))
-        header = split_name(text)
-        named = [word for word in words_of(header.name) if word.casefold() not in _AROUND_UNITS]
-        one = header.unit and len(named) == 1 and (len(named[0]) > 2 or named[0].casefold() in names)
-        role = column_names.role_of(named[0].removesuffix("s")) if one else None  # forces
-        if role and header.dimension == DIMENSION[role]:
-            stated.append((role, header.unit))
-        elif named and not is_unit(cell):
-            return []  # of a table, a figure or another file
-    return stated
-
-
 def _refuse_two_units(table: RawTable, role: str, column: int, unit: str) -> None:
     """Refuse a column whose name and row of units, or a line beside the columns, state different units."""
     inner = split_name(table.names[column]) if table.units[column] else None
     other = parse_unit(unit)
     names = {header.name.casefold() for header in table.headers}
-    lines = {of: line.strip() for line in table.lines for its, of in units_in(line, names) if its == role}
+    lines = {of: line.strip() for line in table.lines for its, of in column_names.units_in(line, names) if its == role}
     stated = {of: f"the line {line[:80]!r}" for of, line in lines.items()}
     same = any(parse_unit(of) == other for of in stated)  # what else is stated may be that of other files
     if inner is not None and inner.dimension == DIMENSION[role]:

@@ -22,7 +22,6 @@ import numpy as np
 from mrdamper.errors import InputError
 from mrdamper.rig_files import column_names
 from mrdamper.rig_files.column_names import UNIT_KEYS, is_unit, names_condition, sentences, split_name, words, words_of
-from mrdamper.rig_files.columns import units_in
 from mrdamper.rig_files.conditions import (
     OTHER_DEVICE,
     stated_by_lines,
@@ -93,7 +92,7 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     lines = [line for text in sorted(texts) if len(own := short_lines(text)) <= _MOST for line in own]
     names = {header.name.casefold() for header in table.headers}
     counts, of_file = partial(scales.counts_in, names=names), partial(said_of_file, name=path.name)
-    about = [scales.states_sign, counts, partial(units_in, names=names), of_file]
+    about = [scales.states_sign, counts, partial(column_names.units_in, names=names), of_file]
     # A current may be that of one test, or an example.
     lines = [line for line in lines if not (stated_by_lines([line], ".") or stated_in_titles([line]))]
     stated = [(lacking and _of_channels(line)) or line * any(tells(line) for tells in about) for line in lines]
