@@ -175,24 +175,20 @@ def _means_current(letters: str) -> bool:
     return letters in _LEVELS or column_names.role_of(letters) == "current"
 
 
-def _with_letter_as_mark(name: str, names: Collection[str]) -> float | None:
-    """Return the current [A] of a name such as MRD_0A5_2Hz, where other names have 0A0 and a third number there."""
-    match, others = LETTER_AS_MARK.search(name), map(LETTER_AS_MARK.search, {*names})
-    alike = [m for m in others if m and match and m.string[: m.start()] == name[: match.start()]]
-    stated = {float(f"{m[1]}.{m[2]}") for m in alike}
-    fits = match and 0.0 in stated and len(stated) > 2 and max(stated) <= LARGEST_STATED
-    return float(f"{match[1]}.{match[2]}") if match and fits else None
-
-
 def current_behind_label(name: str, names: Collection[str]) -> float | None:
     """Return the current [A] behind a digit of a label by the other names: MRD-7_0A; None where it may not.
 
     Another name has a number with a point behind such a label; or the label is a word for a test with its number, and
     another has two digits or all count the tests, at whole amperes from 0 A on. A word for a current has no label.
+    Where A is the decimal mark, as in MRD_0A5_2Hz, other names have 0A0 and a third number there.
     """
     match = behind_digits(name)
     if match is None:
-        return _with_letter_as_mark(name, names)
+        match, others = LETTER_AS_MARK.search(name), map(LETTER_AS_MARK.search, {*names})
+        marked = [m for m in others if m and match and m.string[: m.start()] == name[: match.start()]]
+        numbers = {float(f"{m[1]}.{m[2]}") for m in marked}
+        fits = match and 0.0 in numbers and len(numbers) > 2 and max(numbers) <= LARGEST_STATED
+        return float(f"{match[1]}.{match[2]}") if match and fits else None
     stated = currents_in(f"{name[: match.end(1)]} {name[match.start(2) :]}")
     letters = _letters(name[: match.start()])
     if len(stated) != 1 or stated[0] > LARGEST_STATED or _means_current(letters):
@@ -206,8 +202,8 @@ def current_behind_label(name: str, names: Collection[str]) -> float | None:
     if alike(_BEHIND_LABEL) or (letters in _RUNS and alike(_BEHIND_LONG_LABEL)):
         return stated[0]
     both = {(m[1], m[2]) for m in alike(_BEHIND_DIGITS)}
-    labels, numbers = ({*of} for of in zip(*both, strict=True))
-    whole = numbers == {*map(str, range(len(numbers)))} and 3 <= len(numbers) <= _LARGEST_STEP + 1
+    labels, amounts = ({*of} for of in zip(*both, strict=True))
+    whole = amounts == {*map(str, range(len(amounts)))} and 3 <= len(amounts) <= _LARGEST_STEP + 1
     counted = len(labels) == len(both) and labels == {*map(str, range(1, len(labels) + 1))}
     return stated[0] if whole and counted and letters in _RUNS else None
 

@@ -338,7 +338,11 @@ def with_tests(old: Dataset, new: Dataset) -> tuple[Dataset, list[str], list[str
     files = {run.notes["sha256"] for run in old if run.notes.get("sha256")}
     again: dict[str, Run] = {}  # by the name of the run that it replaces
     fresh: list[Run] = []
-    for now in _by_source(new):
+    sources: dict[tuple[str, ...], list[Run]] = {}  # by file, its columns and the rig; those of no file each alone
+    for run in new:
+        digest = run.notes.get("sha256")
+        sources.setdefault((digest, _columns(run), run.rig) if digest else (run.id,), []).append(run)
+    for now in sources.values():
         digest = now[0].notes.get("sha256")
         before = [run for run in old if digest in files and run.notes.get("sha256") == digest]
         same = [run.id for run in before if any(_reads_alike(run, other) for other in now)]
@@ -360,15 +364,6 @@ def with_tests(old: Dataset, new: Dataset) -> tuple[Dataset, list[str], list[str
     names = unique_names((run.id for run in fresh), (run.id for run in old))
     added = [run if name == run.id else changed(run, id=name) for run, name in zip(fresh, names, strict=True)]
     return Dataset((*kept, *added), old.name), [*again], [run.id for run in added if run.notes.get("sha256") in files]
-
-
-def _by_source(runs: Dataset) -> list[list[Run]]:
-    """Return runs apart by their file, its columns and the rig, in their order; those of no file each alone."""
-    sources: dict[tuple[str, ...], list[Run]] = {}
-    for run in runs:
-        digest = run.notes.get("sha256")
-        sources.setdefault((digest, _columns(run), run.rig) if digest else (run.id,), []).append(run)
-    return [*sources.values()]
 
 
 def _columns(run: Run) -> str:

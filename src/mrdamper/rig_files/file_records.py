@@ -273,18 +273,13 @@ def _folder_of(path: Path, stack: contextlib.ExitStack) -> Path:
     top = stack.enter_context(temporary_folder()) / path.name
     top.mkdir()
     if path.suffix.lower() == ".zip":
-        with archive.as_it_is(path) as source:
-            _unzip(source, top)
+        with archive.as_it_is(path) as source, archive.zip_members(source) as (packed, members):
+            _fill(source, top, ((member.filename, packed.open(member)) for member in members))
     else:
         with archive.opened(path, folder=True) as source:
             _untar(source, top)
     inside = list(top.iterdir())
     return inside[0] if len(inside) == 1 and inside[0].is_dir() else top
-
-
-def _unzip(source: Source, top: Path) -> None:
-    with archive.zip_members(source) as (packed, members):
-        _fill(source, top, ((member.filename, packed.open(member)) for member in members))
 
 
 def _untar(source: Source, top: Path) -> None:

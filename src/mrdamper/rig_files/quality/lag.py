@@ -206,8 +206,12 @@ def _may_be_clear(misfit: float, noise: float) -> bool:
 def force_channel(view: View) -> Iterator[Finding]:
     """Report a force that is late or early against the motion."""
     cycles, motion = steady_cycles(view), view.motion
-    if cycles is None or motion is None or view.noticed("W_CLIPPED", "W_DRIFT") or _stands_still(view, cycles):
+    if cycles is None or motion is None or view.noticed("W_CLIPPED", "W_DRIFT"):
         return
+    if view.noticed("W_FROZEN"):  # stretches that are flat within the cycles look late
+        flagged = view.record.time[flagged_samples(view)]
+        if np.any((flagged >= cycles.starts[0]) & (flagged <= cycles.starts[-1] + cycles.period)):
+            return
     if current_changes(view):  # with it the loop, by more than any lag
         return
     lag = force_lag(view)
@@ -244,14 +248,6 @@ def _description(lag: ForceLag, cycles: Cycles) -> str:
             f"{1 / (2 * np.pi * best.constant * cycles.period):.3g} Hz)"
         )
     return f"the force is {' and '.join(parts)}"
-
-
-def _stands_still(view: View, cycles: Cycles) -> bool:
-    """Check for a channel that is frozen within the cycles: flat stretches look late."""
-    if not view.noticed("W_FROZEN"):
-        return False
-    flagged = view.record.time[flagged_samples(view)]
-    return bool(np.any((flagged >= cycles.starts[0]) & (flagged <= cycles.starts[-1] + cycles.period)))
 
 
 def _negative_spring(view: View, cycles: Cycles) -> tuple[float, float]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -30,22 +29,16 @@ class Octave(Reader):
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """Return the variables as one table."""
-        variables: dict[str, Any] = {}
-        for name, kind, lines in _variables(decoded(whole(source, self.title)).splitlines()):
+        variables, lines = dict[str, Any](), decoded(whole(source, self.title)).splitlines()
+        starts = [i for i, line in enumerate(lines) if line.startswith("# name: ")]
+        for start, stop in zip(starts, [*starts[1:], len(lines)], strict=True):
+            name, kind = lines[start][8:].strip(), next(iter(lines[start + 1 : stop]), "")
             try:
-                value = _value(kind, lines)
+                value = _value(kind[8:].strip(), lines[start + 2 : stop]) if kind.startswith("# type: ") else None
             except ValueError as error:
                 raise damaged(source, self.title, str(error)) from error
             variables |= {} if value is None else {name: value}
         return nested_tables(source, variables, self.title)
-
-
-def _variables(lines: list[str]) -> Iterator[tuple[str, str, list[str]]]:
-    """Yield the name of each variable, its type, and the lines that follow."""
-    starts = [i for i, line in enumerate(lines) if line.startswith("# name: ")]
-    for start, stop in zip(starts, [*starts[1:], len(lines)], strict=True):
-        if start + 1 < stop and lines[start + 1].startswith("# type: "):
-            yield lines[start][8:].strip(), lines[start + 1][8:].strip(), lines[start + 2 : stop]
 
 
 def _value(kind: str, lines: list[str]) -> Any:

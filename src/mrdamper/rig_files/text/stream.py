@@ -135,7 +135,9 @@ def open_text(source: Source, form: FileForm) -> TextStream:
         start, inner = 0, "utf-8"
     else:
         inner = encoding
-    return TextStream(source, file, inner, start, _without_end_mark(file, size), encoding)
+    file.seek(max(0, size - 64))
+    marks = len(end := file.read()) - len(end.rstrip(_CTRL_Z))  # with which old programs close a text
+    return TextStream(source, file, inner, start, size - marks, encoding)
 
 
 def too_long(source: Source, line: int | None) -> RigFileError:
@@ -219,14 +221,6 @@ def _as_utf8(source: Source, encoding: str, mark: int) -> tuple[IO[bytes], int]:
     if decoder.getstate()[1] & 1:  # a carriage return at the end, which might have begun a line end of two characters
         target.write(b"\n")
     return target, target.tell()
-
-
-def _without_end_mark(file: IO[bytes], size: int) -> int:
-    """Return the length of the text: old programs close it with Ctrl-Z."""
-    tail = max(0, size - 64)
-    file.seek(tail)
-    end = file.read(size - tail)
-    return tail + len(end.rstrip(_CTRL_Z)) if end.endswith(_CTRL_Z) else size
 
 
 @dataclass(frozen=True, slots=True)
