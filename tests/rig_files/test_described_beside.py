@@ -360,6 +360,17 @@ def test_a_log_with_two_rows_as_near_as_each_other_is_no_answer(tmp_path):
     assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} == {"E_CURRENT_MISSING"}
 
 
+def test_a_log_may_state_its_times_in_twelve_hours(tmp_path):
+    write(tmp_path, UNITS)
+    rows = ["Clock;Current (A)"]
+    starts, clocks = ("140500", "141400", "142400"), ("2:05 PM", "2:14 pm", "02:24PM")
+    for (name, current), start, clock in zip(CURRENTS.items(), starts, clocks, strict=True):
+        (tmp_path / f"{name}.csv").rename(tmp_path / f"R_20230603_{start}.csv")
+        rows.append(f"{clock};{current}")
+    (tmp_path / "log.csv").write_text("\n".join(rows) + "\n")
+    assert [float(record.current[0]) for record in import_files([tmp_path]).records] == [*CURRENTS.values()]
+
+
 def test_the_rig_of_a_plan_is_that_of_its_tests(tmp_path):
     write(tmp_path, UNITS)
     (tmp_path / "plan.csv").write_text("Test;Rig;Current (A)\nm07;north;0.2\nm08;south;0.9\nm09;north;0\n")

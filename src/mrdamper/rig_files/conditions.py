@@ -446,11 +446,11 @@ def contradicts(one: float, other: float, limits: tuple[float, float] = _AGREE) 
 def time_in(text: str) -> time | None:
     """Return the first time of day that a text states; None if it states none."""
     match = TIME_OF_DAY.search(text)
-    hour = int(match[1]) if match else 24
-    hour = hour % 12 + 12 * (match[5] in "pP") if match and match[5] else hour
-    if match is None or hour > 23:
+    if match is None:
         return None
-    return time(hour, int(match[2]), int(match[3] or 0), int((match[4] or "0").ljust(6, "0")))
+    hour = int(match[1]) % 12 + 12 * (match[5] in "pP") if match[5] else int(match[1])
+    seconds = int(match[3] or 0), int((match[4] or "0").ljust(6, "0"))
+    return time(hour, int(match[2]), *seconds) if hour < 24 else None
 
 
 def day_in(text: str) -> tuple[str, str] | None:
