@@ -78,11 +78,15 @@ def preview(path: str | Path, profile: Profile | str | Path | None = None) -> di
     profile = profile_of(profile)
     with raw_tables(path, profile.file) as tables:
         table, channels = _guess_channels(tables, Path(path), profile)
-        cells = [_first_cells(table, column) for column in range(min(len(table.names), _MOST_SHOWN))]
-        places = {
-            name: {"column": _place(table, channel.column), "unit": channel.unit or "", "sign": channel.sign}
-            for name, channel in channels.items()
-        }
+        cells, places = list[list[str]](), dict[str, dict[str, Any]]()
+        for column in range(min(len(table.names), _MOST_SHOWN)):
+            values, odd = table.try_read(column), [*table.odd[column : column + 1]]
+            cells.append([f"{value:g}" for value in values[column][:_ROWS_SHOWN]] if values else odd)
+        for name, channel in channels.items():
+            places[name] = {"column": None, "unit": channel.unit or "", "sign": channel.sign}
+            with contextlib.suppress(InputError):
+                if channel.column is not None:
+                    places[name]["column"] = column_called(table, channel.column, "a channel")
         for name in SIGNED:
             if names_compression(str(channels[name].column)) and "sign" not in channels[name].model_fields_set:
                 places[name]["sign"] = -1
@@ -90,18 +94,6 @@ def preview(path: str | Path, profile: Profile | str | Path | None = None) -> di
     names, units = table.names[:_MOST_SHOWN], table.units[:_MOST_SHOWN]
     numbers = [*map(table.number, range(len(names)))]
     return {"names": names, "units": units, "numbers": numbers, "rows": rows, "channels": places}
-
-
-def _first_cells(table: RawTable, column: int) -> list[str]:
-    values = table.try_read(column)
-    if values is None:
-        return [table.odd[column]] if table.odd else []
-    return [f"{value:g}" for value in values[column][:_ROWS_SHOWN]]
-
-
-def _place(table: RawTable, column: str | int | None) -> int | None:
-    with contextlib.suppress(InputError):
-        return None if column is None else column_called(table, column, "a channel")
 
 
 def _guess_channels(tables: list[RawTable], path: Path, profile: Profile) -> tuple[RawTable, dict[str, Channel]]:

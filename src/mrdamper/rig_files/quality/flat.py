@@ -39,7 +39,6 @@ _LEAP = 0.03  # of the range: a channel that leaves a flat top with such a step 
 _NEAR = 100  # samples on either side from which the noise is taken
 _ROUNDING = 1e-9  # of the channel's range: less is no noise
 _CHANCE = 1e-4  # that noise repeats itself as often anywhere in the record
-_MOST = 20_000  # stretches looked at
 _OTHER = {"displacement": "force", "force": "displacement"}
 _DEPTH = 0.006  # of the peak-to-peak value; at four times this depth the width is measured again
 _DEEPEST = 0.02  # of it: deeper, where noise asks for that, the steep sides of hysteresis are no wider either

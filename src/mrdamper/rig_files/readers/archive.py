@@ -48,7 +48,11 @@ def opened(path: Path, *, folder: bool = False) -> Iterator[Source]:
             raise source.refuse("E_FORMAT", f"the name says {source.suffix}, the content is a packed file", remedy)
         if packed:
             source = _unzip(source) if head.startswith(b"PK") else _gunzip(source)
-            _refuse_nested(source)
+            if source.size == 0:
+                raise source.refuse("E_EMPTY", "0 bytes", "copy or export the file again")
+            head = source.head()
+            if head.startswith(_PACKED) or head[_TAR] == b"ustar" or is_plain_zip(source):
+                raise source.refuse("E_ARCHIVE", "an archive inside an archive", "unpack it first")
         yield source
 
 
@@ -215,14 +219,6 @@ def _unpacked(source: Source, pieces: Iterable[bytes], packed: int) -> IO[bytes]
         if target.tell() > min(MOST_UNPACKED, MOST_RATIO * packed):
             raise bomb(source)
     return target
-
-
-def _refuse_nested(source: Source) -> None:
-    if source.size == 0:
-        raise source.refuse("E_EMPTY", "0 bytes", "copy or export the file again")
-    head = source.head()
-    if head.startswith(_PACKED) or head[_TAR] == b"ustar" or is_plain_zip(source):
-        raise source.refuse("E_ARCHIVE", "an archive inside an archive", "unpack it first")
 
 
 def _cut(source: Source) -> RigFileError:
