@@ -95,6 +95,7 @@ class _Balanced:
         self.bounds = bounds_of(self.linear)
         self.zero = {i.name: 0.0 for i in self.linear}
         self.measured = project(record.force)
+        self._once: tuple[Floats, Floats, Floats] | None = None  # force without linear parameters, and the table
 
     def model(self, point: Mapping[str, float]) -> tuple[Model, tuple[str, ...]]:
         """Model with the linear parameters solved for, and those held at a bound."""
@@ -105,9 +106,20 @@ class _Balanced:
     def at(self, point: Mapping[str, float]) -> tuple[Model, Floats, Floats, Floats, NDArray[np.bool_]]:
         """Model without linear parameters, their columns and the right side (harmonics), the solution, its bounds."""
         bare = self.problem.model_type.build({**self.problem.fixed, **point, **self.zero})
-        base, forces = linear_table(bare, self.linear, self.motion, steady_state(bare, self.record))
-        columns, right = self.project(forces), self.measured - self.project(base)
+        columns, right = self._table(bare, steady_state(bare, self.record))
         return bare, columns, right, *solve_bounded(columns, right, *self.bounds)
+
+    def _table(self, bare: Model, state: Floats) -> tuple[Floats, Floats]:
+        """Harmonics of the linear columns and of the rest; only the column of the state is computed again, if any."""
+        infos = [i for i in self.linear if i.name == bare.state_column]
+        if self._once is None or not infos:
+            base, forces = linear_table(bare, self.linear, self.motion, state)
+            self._once = base, self.project(forces), self.measured - self.project(base)
+        else:
+            column = linear_table(bare, infos, self.motion, state, self._once[0])[1][:, 0]
+            twice = np.stack([column, column]).T  # a product of matrices, which has the bits of that of all columns
+            self._once[1][:, self.linear.index(infos[0])] = self.project(twice)[:, 0]
+        return self._once[1:]
 
 
 def steady_state(model: Model, record: SineRecord) -> Floats:
