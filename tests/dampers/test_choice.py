@@ -9,7 +9,7 @@ from mrdamper.dampers import choice
 from mrdamper.dampers.choice import CrossValidation, ModelTerm
 from mrdamper.dampers.search_space import level_count, undetermined
 from mrdamper.data import Condition, level_groups
-from mrdamper.models.play_bypass import RISE_CURRENT, PlayBypass, _level_law
+from mrdamper.models.play_bypass import RISE_CURRENT, PlayBypass
 
 RNG = np.random.default_rng(2)
 N, NAMES = 120, ("d", "h1", "c1", "f0")
@@ -94,7 +94,9 @@ def test_the_law_of_the_current_has_a_number_fewer_than_there_are_levels(levels,
 def test_two_levels_show_a_straight_line_and_more_choose_between_it_and_the_onset_of_the_preset():
     def rise(law):
         onset = dict(law.held).get("Ic", RISE_CURRENT)
-        return _level_law(np.array([0.05, 0.25, 0.5]), 10.0, 100.0, onset, 0.0)
+        values = {info.name: min(max(info.bounds[0], 0.1), info.bounds[1]) for info in PlayBypass.parameters()}
+        values |= {"fy0": 10.0, "fy1": 100.0, "Ic": onset, "si": 0.0}
+        return PlayBypass(**values).yield_force(np.array([0.05, 0.25, 0.5]))
 
     few, several = (choice._level_laws(SimpleNamespace(currents=[0.5 * k for k in range(n)])) for n in (2, 3))
     assert [rise(law) for law in few] == [pytest.approx([15.0, 35.0, 60.0])]
