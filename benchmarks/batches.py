@@ -13,11 +13,12 @@ from mrdamper.identification import Problem, identify
 from mrdamper.identification.methods.projection import Projection
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.physics.hysteresis import Shape
-from mrdamper.physics.hysteresis.batch import batch_cost
+from mrdamper.physics.hysteresis.response import follow_alike
 from mrdamper.physics.motion import Path
 from mrdamper.statistics.linear import FixedColumns
 
 SETS = 1000
+_MAX_STATES = 2**17  # states held at a time
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,43 @@ def growth_rows(quick: bool) -> list[Growth]:
     found = [race({"": lambda n=n: batch_cost(path, fixed, shapes(n))}, share)[""] for n in sets]
     rows.append(Growth("grid over shapes", "30 … 1,000", growth(sets, found)))
     return rows
+
+
+@dataclass(frozen=True, eq=False)
+class Products:
+    """Sums over the samples for P shapes."""
+
+    along: Floats  # (P, L) zeta · basis
+    force: Floats  # (P,) zeta · rest of the force [N]
+    square: Floats  # (P,) zeta · zeta
+
+
+def batch_cost(path: Path, fixed: FixedColumns, shapes: Shape) -> Floats:
+    """(P,) sums of squared force errors [N²] of P shapes, by their best coefficients, that of zeta not below zero.
+
+    No array of shapes × samples is kept. The columns are those of the last M samples of the path; earlier samples only
+    determine the state.
+    """
+    sums = products(path, fixed, shapes)
+    left = sums.square - np.sum(sums.along**2, axis=1)  # squared zeta that no column explains
+    gain = np.maximum(sums.force, 0.0) ** 2 / np.maximum(left, 1e-12 * sums.square + np.finfo(float).tiny)
+    return float(fixed.rest @ fixed.rest) - gain
+
+
+def products(path: Path, fixed: FixedColumns, shapes: Shape) -> Products:
+    """Calculate sums of zeta times each column, the rest of the force and itself; arguments as `batch_cost`."""
+    kappa, rho = (np.array(a, dtype=float) for a in np.broadcast_arrays(shapes.kappa, shapes.rho))
+    first = len(path) - fixed.rest.size
+    sums = np.empty((kappa.size, fixed.basis.shape[1] + 2))
+    for value in dict.fromkeys(rho.tolist()):
+        alike = np.flatnonzero(rho == value)
+        few = max(1, _MAX_STATES // len(path))
+        for part in (alike[i : i + few] for i in range(0, alike.size, few)):
+            zeta = follow_alike(shapes.n, value, kappa[part], path)[:, first:]
+            sums[part, :-2] = zeta @ fixed.basis
+            sums[part, -2] = zeta @ fixed.rest
+            sums[part, -1] = np.einsum("pn,pn->p", zeta, zeta)
+    return Products(sums[:, :-2], sums[:, -2], sums[:, -1])
 
 
 def loop(samples: int, cycles: int) -> tuple[Path, FixedColumns]:

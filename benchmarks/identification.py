@@ -12,12 +12,12 @@ from functools import cached_property
 import numpy as np
 
 from benchmarks import conditions
+from benchmarks.batches import products
 from benchmarks.genetic import GENERATIONS, POPULATION, plain_genetic
 from mrdamper.identification import Problem, identify
 from mrdamper.identification.methods.projection import Projection
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.physics.hysteresis import Shape, follow
-from mrdamper.physics.hysteresis.batch import products
 from mrdamper.statistics.linear import FixedColumns
 
 REACHED = 1.01  # cost over the best known that counts as reached
@@ -64,7 +64,7 @@ class Task:
         sums = products(self.problem.motion.path, fixed, Shape(1 / points[:, 4], 0.0, 2.0))
         off, size = points[:, :3] * fixed.scale @ fixed.triangle.T - fixed.along, points[:, 3]
         beside = size**2 * sums.square - 2 * size * sums.force
-        return np.sum(off * (off + 2 * size[:, None] * sums.along), axis=1) + beside + fixed.rest_squared
+        return np.sum(off * (off + 2 * size[:, None] * sums.along), axis=1) + beside + float(fixed.rest @ fixed.rest)
 
     def residual(self, point: np.ndarray) -> np.ndarray:
         """By the closed form in NumPy."""

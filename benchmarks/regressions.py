@@ -14,7 +14,6 @@ from benchmarks.simulation import SHAPE, T, X
 from mrdamper.identification import identify
 from mrdamper.identification.methods.projection import Projection
 from mrdamper.physics.hysteresis import follow
-from mrdamper.physics.hysteresis.batch import batch_cost
 from mrdamper.physics.motion import Path
 
 MOTION = X * np.sin(2 * np.pi * T + 0.3)
@@ -29,7 +28,7 @@ def test_follow(benchmark):
 
 
 def test_batch_cost(benchmark):
-    benchmark(batch_cost, *batches.loop(1000, 1), batches.shapes(100))
+    benchmark(batches.batch_cost, *batches.loop(1000, 1), batches.shapes(100))
 
 
 def test_search(benchmark):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from support.synthetic import synthetic_run
 
+from benchmarks.batches import batch_cost
 from mrdamper.data import Condition
 from mrdamper.identification import Problem
 from mrdamper.identification.columns import linear_table
@@ -14,8 +15,7 @@ from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.models.kwok import Kwok
 from mrdamper.models.spencer import Spencer
 from mrdamper.physics.hysteresis import Shape, follow
-from mrdamper.physics.hysteresis.batch import batch_cost, follow_alike, follow_with_slope
-from mrdamper.physics.hysteresis.response import follow_one
+from mrdamper.physics.hysteresis.response import follow_alike, follow_one, follow_with_slope
 from mrdamper.physics.motion import Path, sine
 from mrdamper.statistics import linear
 from mrdamper.statistics.levenberg_marquardt import least_squares

@@ -15,7 +15,7 @@ from mrdamper.errors import IdentificationError
 from mrdamper.identification.problem import Problem
 from mrdamper.models import Model, Scale
 from mrdamper.physics.hysteresis import Shape
-from mrdamper.physics.hysteresis.batch import follow_alike
+from mrdamper.physics.hysteresis.response import follow_alike
 from mrdamper.statistics.functions.selection import fold_groups
 from mrdamper.statistics.linear import on_one_blas_thread
 

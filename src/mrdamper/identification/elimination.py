@@ -20,8 +20,7 @@ from mrdamper.errors import ParameterError
 from mrdamper.identification.columns import bounds_of, linear_table
 from mrdamper.identification.problem import DELAY, Problem
 from mrdamper.models import Model, Scale, SearchAxis
-from mrdamper.physics.hysteresis.batch import follow_with_slope
-from mrdamper.physics.hysteresis.response import follow_one
+from mrdamper.physics.hysteresis.response import follow_one, follow_with_slope
 from mrdamper.statistics.linear import FixedColumns
 
 _MIN_UNEXPLAINED_SHARE = 1e-10  # share of a squared column below which the others explain all of it

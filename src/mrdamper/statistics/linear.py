@@ -215,11 +215,6 @@ class FixedColumns:
         return bool(pivots.min(initial=1.0) > _MIN_RELATIVE_PIVOT * pivots.max(initial=1.0))
 
     @cached_property
-    def rest_squared(self) -> float:
-        """Squared right side that no column explains."""
-        return float(self.rest @ self.rest)
-
-    @cached_property
     def inverse(self) -> Floats:
         """(L, L) matrix from coefficients of the basis to those of the columns."""
         return np.linalg.inv(self.triangle) / self.scale[:, None]

@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mrdamper.data import Floats, index_at
+from mrdamper.data import Floats
 from mrdamper.errors import IdentificationError, ParameterError
 from mrdamper.identification.columns import bounds_of, linear_table
 from mrdamper.identification.elimination import Elimination
@@ -23,16 +22,14 @@ from mrdamper.identification.problem import DELAY, DELAY_LIMIT, Method, Problem,
 from mrdamper.models import Model, Scale, SearchAxis
 from mrdamper.models.base import box_of, grid_of, names_at_bounds, values_at
 from mrdamper.models.recorded import force_tangents
-from mrdamper.physics.hysteresis import Shape
-from mrdamper.physics.hysteresis.batch import batch_cost
-from mrdamper.physics.motion import Path
+from mrdamper.physics.hysteresis.response import follow_one
 from mrdamper.statistics.levenberg_marquardt import Minimum, forward_differences, least_squares
 from mrdamper.statistics.linear import FixedColumns, on_one_blas_thread, project_out_columns, solve_bounded
 from mrdamper.statistics.scalar_least_squares import least_squares_in_one
 from mrdamper.statistics.stop_reason import StopReason
 
 _GRID_SAMPLES = 1500  # the grid only has to find the region of the minimum
-_GRID_SAMPLES_A_CYCLE, _GRID_CYCLES = 100, 3  # where all shapes are tried at once
+_GRID_SAMPLES_A_CYCLE, _GRID_CYCLES = 100, 3  # of a shape
 _LONG_RECORD_SAMPLES = 40_000  # samples from which an integrated model is first searched on the last cycles
 _MAX_TANGENT_STEPS = 100  # steps of a refinement by exact derivatives, which decreases the cost to its end
 _PIECE_CYCLES, _PIECE_SAMPLES_A_CYCLE = 5, 500
@@ -176,7 +173,7 @@ def _best_of_grid(
 ) -> tuple[list[Floats], int]:
     grid = grid_of(axes)
     if elimination and elimination.kind.has_shape:
-        costs = _batched_costs(elimination, [values_at(axes, u) for u in grid])
+        costs = _costs_of_shapes(elimination, [values_at(axes, u) for u in grid])
     else:
         thin = max(1, problem.force.size // _GRID_SAMPLES)
         costs = np.array([float(np.sum(_project(problem, values_at(axes, u), thin).residual ** 2)) for u in grid])
@@ -187,38 +184,22 @@ def _best_of_grid(
     return [grid[i] for i in np.argsort(costs)[:keep]], len(grid)
 
 
-def _batched_costs(elimination: Elimination, points: list[dict[str, float]]) -> Floats:
-    """Costs of the grid on a few cycles, all shapes of one n at once."""
-    path, rows = _few_cycles(elimination.problem)
-    fixed = FixedColumns.of(elimination.fixed_columns.basis[rows], elimination.fixed_columns.rest[rows])
-    shapes = np.array([elimination.kind.shape(point) for point in points], dtype=float)
+def _costs_of_shapes(elimination: Elimination, points: list[dict[str, float]]) -> Floats:
+    """Costs of the grid on the last cycles, thinned, without the part that no shape changes."""
+    problem, whole = elimination.problem, elimination.fixed_columns
+    cycle = (len(problem.motion) - 1) / float(np.ptp(problem.motion.time)) / problem.analysis.condition.frequency_Hz
+    thin, size = max(1, int(cycle / _GRID_SAMPLES_A_CYCLE)), min(problem.force.size, math.ceil(_GRID_CYCLES * cycle))
+    first = 1 + (size - 1) // thin * thin  # of the samples up to the last
+    rows, part = (slice(count - first, None, thin) for count in (problem.force.size, len(problem.motion)))
+    fixed = FixedColumns.of(whole.basis[rows], whole.rest[rows])
     costs = np.empty(len(points))
-    for n in set(shapes[:, 2].tolist()):
-        alike = shapes[:, 2] == n
-        costs[alike] = batch_cost(path, fixed, Shape(shapes[alike, 0], shapes[alike, 1], n))
+    for i, point in enumerate(points):
+        kappa, rho, n = elimination.kind.shape(point) or (math.nan,) * 3
+        zeta = follow_one(kappa, rho, n, problem.motion.path, part)
+        along, square = zeta @ fixed.basis, float(zeta @ zeta)
+        left = max(square - float(along @ along), 1e-12 * square + np.finfo(float).tiny)  # that no column explains
+        costs[i] = -(max(float(zeta @ fixed.rest), 0.0) ** 2) / left
     return costs
-
-
-def _few_cycles(problem: Problem) -> tuple[Path, NDArray[np.intp]]:
-    """Return the last strokes of the motion, thinned, and which scored samples they hold.
-
-    The grid only has to find the region of the minimum. The reversals are those of the whole motion.
-    """
-    whole, size = problem.motion.path, len(problem.motion)
-    cycle = (size - 1) / float(np.ptp(problem.motion.time)) / problem.analysis.condition.frequency_Hz
-    thin = max(1, int(cycle / _GRID_SAMPLES_A_CYCLE))
-    scored = min(problem.force.size, math.ceil(_GRID_CYCLES * cycle))
-    led = index_at(whole.stroke, whole.stroke[max(0, size - scored - math.ceil(cycle / 2))])
-    picked = np.arange(size - 1, led - 1, -thin)[::-1]
-    path = Path(
-        whole.stroke[picked] - whole.stroke[picked[0]],
-        whole.distance[picked],
-        whole.direction[picked],
-        whole.lengths[int(whole.stroke[picked[0]]) :],
-        float(whole.direction[picked[0]]),
-    )
-    rows = picked[picked >= size - scored] - (size - problem.force.size)
-    return path, rows
 
 
 def _last_cycles(problem: Problem) -> Problem:

@@ -16,6 +16,8 @@ from mrdamper.physics.hysteresis.shape import Shape
 from mrdamper.physics.motion.path import Path
 from mrdamper.tracing import Tape, choose, streamed
 
+_BLOCK = 20_000  # samples whose states are computed at a time, with their slopes
+
 
 def follow_step(tape: Tape, shape: Shape, path: Any, zeta0: ArrayLike = 0.0) -> Any:
     """`follow` for one sample."""
@@ -112,3 +114,79 @@ def advance(curve: MasterCurve, rho: Any, w: Any, phi: Any, xp: ModuleType = mat
         )
 
     return choose(w < 0, released, lambda: curve.climb(w, phi, xp))
+
+
+def follow_with_slope(kappa: float, rho: float, n: float, path: Path, part: slice) -> tuple[Floats, Floats]:
+    """States as `follow_one`, and their derivative with respect to ln kappa.
+
+    Along a stroke the state is a function of kappa times the distance, shifted by where the stroke
+    began; so its derivative is the rate there times that distance and the derivative of the shift.
+    """
+    curve = master_curve(n)
+    w, slope = 0.0, 0.0
+    starts, shifts = [0.0], [0.0]
+    full = (curve.release_distance(1.0, rho, math) + curve.full) / kappa
+    for length in path.lengths:
+        if w == -1.0 and length >= full:
+            slope = 0.0
+        else:
+            end = advance(curve, rho, w, kappa * length)
+            slope = -_rate(end, rho, n) * (kappa * length + shifts[-1])
+            w = -end
+        starts.append(w)
+        shifts.append(slope / _rate(w, rho, n) if slope else 0.0)
+    strokes, distances, directions = path.stroke[part], path.distance[part], path.direction[part]
+    first, later = np.array(starts), np.array(shifts)
+    states, slopes = np.empty((2, distances.size))
+    for begin in range(0, distances.size, _BLOCK):  # of which all arrays stay in the processor's cache
+        rows = slice(begin, begin + _BLOCK)
+        stroke, phi, direction = strokes[rows], kappa * distances[rows], directions[rows]
+        state = state_at(curve, rho, first, stroke, phi)
+        size = np.abs(state)
+        rate = 1.0 - (size if n == 1 else size * size if n == 2 else size**n)
+        if rho != 1.0:
+            before = np.flatnonzero(state < 0)
+            rate[before] = (1.0 - rho) + rho * rate[before]
+        states[rows], slopes[rows] = direction * state, direction * (rate * (phi + later[stroke]))
+    return states, slopes
+
+
+def _rate(w: float, rho: float, n: float) -> float:
+    return 1.0 - w**n if w >= 0 else 1.0 - rho * (-w) ** n
+
+
+def follow_alike(n: float, rho: float, kappa: Floats, path: Path) -> Floats:
+    """(P, N) states from zero for P shapes that differ in kappa only, all at once."""
+    curve = master_curve(n)
+    starts = _starts(n, rho, kappa, path)
+    to_zero = np.where(starts < 0, curve.release_distance(np.maximum(-starts, 0.0), rho, np), 0.0)
+    phi = np.multiply.outer(kappa, path.distance)
+    past = (phi - to_zero[:, path.stroke]).ravel()
+    w = on_curve(curve, rho, past).reshape(phi.shape)
+    if (starts > 0).any():
+        ahead = np.maximum(starts, 0.0)[:, path.stroke]
+        w = np.where(ahead > 0, curve.climb(ahead.ravel(), phi.ravel(), np).reshape(phi.shape), w)
+    w *= path.direction
+    return w
+
+
+def _starts(n: float, rho: float, kappa: Floats, path: Path) -> Floats:
+    """(P, K) state in the direction of motion at the beginning of each stroke."""
+    curve = master_curve(n)
+    starts = np.full((kappa.size, len(path.lengths) + 1), -1.0)
+    starts[:, 0] = 0.0
+    lengths = np.array(path.lengths)
+    if not lengths.size:
+        return starts
+    # Shapes that saturate in every stroke need no recursion.
+    full = curve.release_distance(1.0, rho, math) + curve.full
+    stepped = np.flatnonzero(kappa * lengths.min() < full)
+    kappa, w = kappa[stepped], np.zeros(stepped.size)
+    for k, length in enumerate(path.lengths if stepped.size else (), 1):
+        past = kappa * length - curve.release_distance(np.maximum(-w, 0.0), rho, np)
+        end = curve.climb(np.maximum(w, 0.0), np.maximum(past, 0.0), np)
+        turned = past < 0
+        if turned.any():
+            end[turned] = -curve.release(-past[turned], rho, np)
+        w = starts[stepped, k] = -end
+    return starts
