@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from mrdamper.systems.kernel import ElementParameters, LoopElement, interpreted_loop, slope_and_scale
+from mrdamper.tracing.c_writer import PREAMBLE, functions
 from mrdamper.tracing.compiled.cache import load
 from mrdamper.tracing.compiled.record import address
-from mrdamper.tracing.compiled.writer import PREAMBLE, functions
 
 _LOOP = Path(__file__).with_name("loop.c")
 _STEPS = 40  # steps over which a new library is compared with the interpreter

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from mrdamper.tracing import Tape, program
+from mrdamper.tracing.c_writer import record_source
 from mrdamper.tracing.compiled import RecordProgram, cache, compilers, record
-from mrdamper.tracing.compiled.writer import record_source
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 TIME = np.linspace(0, 3, 200)

@@ -9,8 +9,8 @@ import pytest
 from mrdamper.models.play_bypass import PlayBypass
 from mrdamper.models.recorded import CHANNELS, traced_motion
 from mrdamper.tracing import Tape, program
+from mrdamper.tracing.c_writer import record_source
 from mrdamper.tracing.compiled import RecordProgram
-from mrdamper.tracing.compiled.writer import record_source
 from mrdamper.tracing.tangent import with_tangents
 
 MODEL = PlayBypass(

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mrdamper.tracing import Program
+from mrdamper.tracing.c_writer import record_source
 from mrdamper.tracing.compiled.cache import load
-from mrdamper.tracing.compiled.writer import record_source
 from mrdamper.tracing.python import python_functions, python_source
 
 Floats = NDArray[np.float64]
