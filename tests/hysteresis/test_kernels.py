@@ -104,7 +104,7 @@ def test_fixed_columns_say_when_they_explain_each_other():
     fixed = FixedColumns.of(table[:, :2], 3.0 + 2.0 * np.arange(30.0))
     assert fixed.independent
     np.testing.assert_allclose(fixed.inverse @ fixed.along, [3.0, 2.0])
-    assert fixed.rest_squared < 1e-20
+    assert fixed.rest @ fixed.rest < 1e-20
 
 
 def test_a_long_table_is_factored_block_by_block_as_at_once(monkeypatch):
