@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mrdamper.dampers.coil import field_step
 from mrdamper.dampers.envelope import SLACK
 from mrdamper.data import Condition, Floats
 from mrdamper.errors import ExcitationError, ParameterError
@@ -50,7 +49,7 @@ def trace(damper: Damper, free: bool = False) -> Program:
     x, v, a = (tape.input(name) for name in ("displacement", "velocity", "acceleration"))
     asked, dt = tape.input("current", middle), tape.input("dt")
     moved = x - tape.previous(x, "displacement")
-    field_current = field_step(tape, dt, asked, damper.coil.rise_s, damper.coil.fall_s) if damper.coil else abs(asked)
+    field_current = damper.coil.step(tape, dt, abs(asked)) if damper.coil else abs(asked)
     motion = TracedMotion(
         tape, x, v, a, tape.assume(field_current, middle), TracedStep(tape, dt), TracedStep(tape, moved)
     )

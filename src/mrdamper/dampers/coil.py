@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -15,7 +16,8 @@ import numpy as np
 from mrdamper.data.arrays import Floats
 from mrdamper.data.strict_text import STRICT
 from mrdamper.errors import ParameterError
-from mrdamper.tracing import Tape, choose
+from mrdamper.tracing import Tape, choose, program
+from mrdamper.tracing.compiled.record import RecordProgram
 
 _MAX_LAG_S = 10.0  # s; the longest lag of a coil
 
@@ -85,6 +87,10 @@ class Coil:
         """(N,) current [A] of the present field at (N,) times [s]; see `field_current`."""
         return field_current(time, current, self.rise_s, self.fall_s)
 
+    def step(self, tape: Tape, dt: Any, size: Any) -> Any:
+        """`along` for one sample, on a tape; `size` is the magnitude of the current, `dt` the step of time."""
+        return field_step(tape, dt, size, self.rise_s, self.fall_s) if max(self.rise_s, self.fall_s) > 0 else size
+
 
 def field_current(time: Floats, current: Floats, rise: float, fall: float, signed: bool = False) -> Floats:
     """Return the current (N,) whose steady field is the present one: the lagged magnitude of a current (N,) [A].
@@ -96,38 +102,26 @@ def field_current(time: Floats, current: Floats, rise: float, fall: float, signe
     wanted = np.asarray(current, dtype=float) if signed else np.abs(current)
     if (rise <= 0 and fall <= 0) or not np.any(np.diff(wanted)):
         return wanted.copy()
-    lagged = wanted.tolist()
-    steps, last, gap = np.diff(time).tolist(), lagged[0], 0.0
-    for i, step in enumerate(steps, start=1):
-        now = lagged[i]
-        if gap != 0.0 or now != last:
-            gap = _gap(gap, now - last, step, rise, fall)
-            lagged[i] = now - gap
-        last = now
-    return np.array(lagged)
+    record, given = _field_record(), (float(rise), float(fall))
+    derived = record.prepare(given)
+    assert derived is not None
+    return record.along(given, derived, record.starts, (np.diff(time, prepend=time[0] - 1.0), wanted)).outputs[0]
 
 
-def _gap(gap: float, change: float, step: float, rise: float, fall: float) -> float:
-    """Advance the difference between commanded and lagged current by one step: dg/dt = s − g/T, T by the sign of g."""
-    upward = gap > 0 or (gap == 0 and change > 0)
-    constant, slope = (rise if upward else fall), change / step
-    if gap * change < 0 and constant > 0:  # if they become equal within the step, the other lag holds from there on
-        met = constant * math.log1p(-gap / (slope * constant))
-        if met < step:
-            gap, step, constant = 0.0, step - met, (fall if upward else rise)
-    elif constant <= 0 and gap * change < 0:
-        gap, constant = 0.0, (fall if upward else rise)
-    if constant <= 0:
-        return 0.0
-    decay = math.expm1(-step / constant)
-    return gap + (gap - slope * constant) * decay
+@cache
+def _field_record() -> RecordProgram:
+    """Return `field_step` as a program, whose lags can be set."""
+    tape = Tape()
+    step, wanted = tape.input("dt"), tape.input("current")
+    lags = (tape.parameter(name, 1.0) for name in ("rise", "fall"))
+    return RecordProgram(program(tape, {"field": field_step(tape, step, wanted, *lags)}))
 
 
-def field_step(tape: Tape, step: Any, current: Any, rise: float, fall: float) -> Any:
-    """`field_current` for one sample, on a tape; `step` is the step of time."""
-    wanted = abs(current)
-    if rise <= 0 and fall <= 0:
-        return wanted
+def field_step(tape: Tape, step: Any, wanted: Any, rise: Any, fall: Any) -> Any:
+    """`field_current` for one sample, on a tape: dg/dt = s − g/T for the gap g to a wanted current of slope s.
+
+    If the two become equal within the step of time `step`, the other lag holds from there on.
+    """
     change = wanted - tape.previous(wanted, "wanted_current")
     gap = tape.remember("current_gap")
     slope = change / step

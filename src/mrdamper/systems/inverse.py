@@ -16,7 +16,7 @@ import numpy as np
 
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.causal import steps_of
-from mrdamper.dampers.coil import Coil, field_step
+from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.envelope import SLACK
 from mrdamper.dampers.streaming import stream
 from mrdamper.data import Floats
@@ -128,7 +128,7 @@ def invert_on(
     before = tape.select(tape.first, steady, field)  # a coil starts in the steady state of its first command
     ahead = steady + (steady - before) * lag / np.maximum(_FIELD_TIME_RATIO * lag, 2 * motion["dt"])
     command = np.minimum(np.maximum(ahead, 0.0), highest)
-    field_current = field_step(tape, motion["dt"], command, coil.rise_s, coil.fall_s)
+    field_current = coil.step(tape, motion["dt"], command)
     tape.update(field, field_current)
     return Demand(command, copy.settle(field_current)["force"], lowest, most)
 
