@@ -57,7 +57,7 @@ class _Node:
     def add(self, key: str, array: Array) -> None:
         """Add the columns of an array."""
         columns = columns_of(key, array, self.lists, self.units.get(key, ""))
-        self.columns += [_Column(*column) for column in columns]
+        self.columns += [_Column(name, unit or self.units.get(name, ""), values) for name, unit, values in columns]
 
 
 def nested_tables(source: Source, tree: Mapping[str, Any], title: str, *, may_be_notes: bool = False) -> list[RawTable]:

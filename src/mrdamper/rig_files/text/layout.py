@@ -92,7 +92,7 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
     if sampling.counts(row[0] for row in rows):
         lines = [*_with_name_of_numbers(lines[:first], separator, width), *lines[first:]]
     seconds = any(_SIMULINK in line for line in lines[:first])
-    lines = [*_without_keys(lines[:first], separator), *lines[first:]]
+    lines = [*_without_keys(_without_labels(lines[:first], separator, width), separator), *lines[first:]]
     header, unit_row = _header_lines(lines, first, separator, width, source, form)
     if header is not None and not is_comment(lines[header]):
         sampling.split_strictly(lines[header], separator, source, header + 1)
@@ -148,6 +148,14 @@ def _with_name_of_numbers(above: Sequence[str], separator: str, width: int) -> l
     if len(named) != 1 or len(cells_of(above[named[0]], separator)) != width - 1:
         return list(above)
     return [f'""{separator}{line}' if i == named[0] else line for i, line in enumerate(above)]
+
+
+def _without_labels(above: Sequence[str], separator: str, width: int) -> list[str]:
+    """Return lines above the rows without what begins each where the units have one cell too many: Unit, s, mm, kN."""
+    rows = [[cell.strip(' "') for cell in cells_of(line, separator)] for line in above if separator != SPACES]
+    rows = [row * (len(row) == width + 1) for row in rows] or [[]] * len(above)
+    units = any(row and row[0].casefold() in UNIT_KEYS and all(map(is_unit, row[1:])) for row in rows)
+    return [line.partition(separator)[2] if row and units else line for row, line in zip(rows, above, strict=True)]
 
 
 def _behind_labels(lines: Sequence[str]) -> list[str]:
