@@ -372,10 +372,11 @@ class _Intake:
                 self._exchange(record, replace(record, rig=record.rig or text * (kind == "rig"), provenance=notes))
             own = [self.tests()[i] for i, _ in tests]
         stated, other = plans.currents_beside(path, results, own), plans.other_motions(path, results, own)
-        refused = plans.discarded_tests(path, remarks, own)
+        answers = [self._table.path.name] if self._table else []
+        refused = self._unanswered(own, plans.discarded_tests(path, remarks, own), answers)
+        own = [self.tests()[i] for i, _ in tests]
         if other is not None:
             refused = dict.fromkeys(range(len(own)), other) if own[0][0] == path else {}
-        answers = [self._table.path.name] if self._table else []
         answers += ["profile"] if other else []
         near = dict[int, ColumnError]()
         for i, ((file, record), (current, whence)) in enumerate(zip(own, stated or (), strict=False)):
@@ -384,12 +385,7 @@ class _Intake:
             try:
                 coil_current.with_stated_current(record, current, whence, file.name)
             except InputError as error:
-                if (answer := record.provenance.get("current_from", "")) in answers:
-                    self._exchange(record, record.noticed(Finding("W_CHOSEN", f"{answer} decides: {error.found}")))
-                else:
-                    refused[i] = error
-                    doubtful = replace(record, doubt=error)
-                    self.unchecked = [(p, doubtful if (p, r.id) == (file, record.id) else r) for p, r in self.unchecked]
+                refused |= self._unanswered({i: (file, record)}, {i: error}, answers)
         if contradicted := [i for i, error in refused.items() if error.code == "E_CURRENT_CONTRADICTS"]:
             refused = near | refused  # a plan of another version
         for i in {*near} - {*contradicted}:
@@ -399,6 +395,24 @@ class _Intake:
         if path not in self._plans:
             self._cut(path, remarks, [test for i, test in enumerate(own) if i not in refused])
         return bool(stated) and other is None
+
+    def _unanswered(
+        self,
+        tests: Mapping[int, tuple[Path, Record]] | _SomeTests,
+        refused: Mapping[int, InputError],
+        answers: list[str],
+    ) -> dict[int, InputError]:
+        """Return the refusals of tests but of those that have their current by an answer, which is noted with them."""
+        unanswered = dict[int, InputError]()
+        for i, error in refused.items():
+            file, record = tests[i]
+            if (answer := record.provenance.get("current_from", "")) in answers:
+                self._exchange(record, record.noticed(Finding("W_CHOSEN", f"{answer} decides: {error.found}")))
+                continue
+            unanswered[i] = error
+            doubtful = replace(record, doubt=error)
+            self.unchecked = [(p, doubtful if (p, r.id) == (file, record.id) else r) for p, r in self.unchecked]
+        return unanswered
 
     def _exchange(self, record: Record, other: Record) -> None:
         self._found = [(path, other if own is record else own) for path, own in self._found]
@@ -414,7 +428,7 @@ class _Intake:
     def _join_channels(self, others: list[Path], texts: Sequence[Path]) -> set[Path]:
         """Join channels of several files, and currents that other files state; the files that were used."""
         refused: list[Path] = []
-        parts = [part_of(path, self._profile.of_file(path)[1]) for path in others]
+        parts = [part_of(path, self._profile.of_file(path)[1]) for path in others if not self._lists_tests(path)]
         for path, (run, own) in self._shares.items():
             try:
                 parts.append(part_of(path, own, run))
@@ -459,6 +473,12 @@ class _Intake:
         gaps = tuple(filter(None, (plans.misfit_of_plan(path, self._results(path), open_tests) for path in paths)))
         self._pending = [(path, r.noticed(*gaps) if r.current is None else r) for path, r in self._pending] + doubtful
         return used
+
+    def _lists_tests(self, path: Path) -> bool:
+        """Tell if a table has a row for each test that a column of a record beside it names: it is no logger."""
+        results = self._results(path)
+        files = dict.fromkeys(file for file, _ in self._pending if number_of(file) == number_of(path))
+        return any(plans.tests_by(file, results, self._profile.of_file(file)[1]) for file in files if results)
 
     def _folders_with_plans(self, paths: Sequence[Path]) -> list[Path]:
         """Return the folders that hold a plan each, of days or dampers, where every test lies in one of them."""

@@ -20,6 +20,7 @@ from mrdamper.rig_files.file_records import Heading, digest_of, headings_of
 from mrdamper.rig_files.mapping.completion import completed, item_of
 from mrdamper.rig_files.mapping.description import SHORT_TEXTS, short_lines, with_notes
 from mrdamper.rig_files.mapping.rasters import with_joined_rasters, with_one_clock
+from mrdamper.rig_files.parts import tests_of
 from mrdamper.rig_files.profile import Channel, FileForm, Profile
 from mrdamper.rig_files.readers import ask_tables, raw_tables
 from mrdamper.rig_files.readers.arrays import array_table
@@ -54,8 +55,8 @@ def holds_channels(path: Path, form: FileForm) -> bool:
 def part_of(path: Path, profile: Profile, run: str = "") -> Part | None:
     """Return the channels of a file that is no whole test: several with a time, or the only one, which its name tells.
 
-    None if it has none, or several tables. Parts of one test have one `run`, or the same numbers in their names;
-    files of one column lie in one folder and have one name beside the channel's: run7_force_N.txt, run7_time_s.txt.
+    None if it has none, or several tables or tests. Parts of one test have one `run`, or the same numbers in their
+    names; files of one column lie in one folder and have one name beside the channel's: run7_force_N.txt, run7_t_s.txt.
 
     Raises `InputError` if the file of a `run` lacks a channel that the profile says is in it, or a time.
     """
@@ -64,7 +65,7 @@ def part_of(path: Path, profile: Profile, run: str = "") -> Part | None:
     other_logger = profile.model_copy(update={"file": form, "channels": others})
     try:
         with raw_tables(path, profile.file) as tables:
-            if len(tables) != 1:
+            if len(tables) != 1 or not (run or len(tests_of(tables[0], profile.file, {})) == 1):
                 return None
             table, alone = completed(with_notes(tables[0], path, profile)), len(tables[0].names) == 1
             called = {w.casefold() for name in tables[0].names * alone for w in words_of(name) if w.isalpha()}
@@ -118,7 +119,7 @@ def joined_files(parts: Sequence[Part], profile: Profile) -> Iterator[tuple[list
     for group in groups.values():
         group.sort(key=lambda part: "force" not in part.table.names)
         names = [part.path.name for part in group]
-        columns = ", ".join(part.columns for part in group)
+        columns = "; ".join(part.columns for part in group)
         files = {"file": group[0].test.name, "files": ", ".join(names), "columns": columns}
         try:
             table = _together(group)

@@ -221,7 +221,10 @@ def discarded_tests(path: Path, results: Results | None, tests: Tests) -> dict[i
     refused = {i: remarks[row] for i, row in enumerate(rows_beside(path, results, tests)) if remarks[row]}
     names = last_parts(parts)
     left_out = toml([names[parts[i]] for i in refused])
-    remedy = f"set [file] leave_out = {left_out} in a profile, or correct the remark if a test is valid"
+    remedy = (
+        f"set [file] leave_out = {left_out} in a profile; to keep a test that is valid, write its current into "
+        "tests.csv (--write-tests), or correct the remark"
+    )
     problems = {i: printable(f"{path.name} has the remark {of[:80]!r} on this test") for i, of in refused.items()}
     where = {i: files[i].name for i in refused}
     return {i: QualityError(of, where=where[i], remedy=remedy, code="E_DISCARDED") for i, of in problems.items()}

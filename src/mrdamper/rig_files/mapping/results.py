@@ -261,7 +261,7 @@ class Results:
         for i, name in enumerate(table.names if table.words is not None else ()):
             own = _key(split_name(name).name)
             at = [k for k, key in enumerate(self.keys) if key and _key(split_name(key).name) == own]
-            if len(at) != 1 or table.words is None:
+            if len(at) != 1 or table.words is None or table.headers[i].role == "time":
                 continue
             numbers = {_key(label) for label in table.words(i).labels} - {""}
             rows = {_key(cells[at[0]]) for cells in (*self.cells, *self.pauses)}
