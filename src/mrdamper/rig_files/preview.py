@@ -38,7 +38,7 @@ _ROLE = re.compile(r"\[channels\.(\w+)\]")
 _UNITS = {
     "time": ("s", "ms", "us"),
     "length": ("mm", "m", "in", "cm"),
-    "force": ("N", "kN", "lbf", "kgf"),
+    "force": ("N", "kN", "lbf", "kgf", "tf"),
     "current": ("A", "mA"),
     "velocity": ("m/s", "mm/s"),
 }

@@ -25,16 +25,23 @@ from mrdamper.rig_files.rig_import import ImportResult, import_files, read_runs
 _OF_MOTION = re.compile(r"(?i)0[ _]?m?(?:hz|mm)|(?<![a-z])(?:f|freq|hz|a|amp|x|run|test|t|n|no|nr)[ _=-]*0")
 _OF_CURRENT = re.compile(r"(?i)(?<![a-z])(?:i|cur\w*|amps?|coil)[ _=-]*$")
 
+_FORM = (
+    'names = ["time [s]", "displacement [mm]", "force [N]"]  # of all columns, in order',
+    "data_line =  # number of the first line of numbers",
+)
+
 
 def profile_template(paths: Sequence[str | Path], profile: Profile) -> tuple[str, list[str]]:
     """Return the text of a profile for files, and the problems that reading one of them with it still has.
 
-    Raises `InputError` if the form of the file cannot be found.
+    Where the form of the file cannot be found its keys are those that a person may state.
     """
     problems: Sequence[InputError] = ()
     with _file_for_profile(paths, profile) as (first, refused):
-        guess = guess_profile(first, profile)
-        columns = columns_of(first, profile)
+        try:
+            guess, columns = guess_profile(first, profile), columns_of(first, profile)
+        except InputError as error:
+            return profile_text(profile, {"file": _FORM}) + _alternatives({}, {}), [str(error)]
         kinds = {kind: headings_of(path, profile) for kind, path in files_by_kind(refused, profile).items()}
         if kinds:
             guess = with_files(guess, kinds)
