@@ -297,9 +297,9 @@ def units_in(line: str, names: Collection[str] = ()) -> list[tuple[str, str]]:
     """Return the channels of which a line states the unit and nothing else, and the units: the force column is in N.
 
     A letter stands for a channel only if it is one of some names of columns. Behind such a name other texts may stand:
-    x; displacement; cm; LVDT.
+    x; displacement; cm; LVDT, also as a row of a table: | x | displacement | cm |.
     """
-    name, *others = (cell.strip() for cell in line.split("; "))
+    name, *others = (cell.strip(" `*") for cell in re.split(r"; |[|\t]", line.strip(" |")))
     if name.casefold() in names and (role := role_of(name)) and sum(map(is_unit, others)) == 1:
         unit = next(filter(is_unit, others))
         return [(role, unit)] if split_name("", unit).dimension == DIMENSION[role] else []
@@ -314,6 +314,8 @@ def _units_in_sentence(sentence: str, names: Collection[str]) -> list[tuple[str,
         text = f"{cell} in {behind}" if is_unit(behind) else re.sub(r"\s*[:=]\s+", " in ", cell.rstrip("."))
         header = split_name(text)
         named = [word for word in words_of(header.name) if word.casefold() not in _AROUND_UNITS]
+        if len({*map(role_of, named)}) == 1 < len(named) and named[0].casefold() in names:
+            named = named[:1]  # f: force
         one = header.unit and len(named) == 1 and (len(named[0]) > 2 or named[0].casefold() in names)
         role = role_of(named[0].removesuffix("s")) if one else None  # forces
         if role and header.dimension == DIMENSION[role]:
@@ -348,3 +350,8 @@ def unknown_unit(header: str) -> str:
     """Return the text in brackets behind a name that is no known unit."""
     match = _BRACKETED.match(header[:_LONGEST_NAME])
     return "" if match is None or match["unit"].strip("- ") == "" else match["unit"].strip()
+
+
+def find_name(line: str, name: str) -> re.Match[str] | None:
+    """Return where a line has a name as a word of its own."""
+    return re.search(rf"(?<!\w){re.escape(name)}(?!\w)", line, re.IGNORECASE) if name else None

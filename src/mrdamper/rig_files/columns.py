@@ -12,9 +12,18 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.errors import ColumnError, CombinedError, InputError, UnitError, listed, printable
 from mrdamper.rig_files import column_names
-from mrdamper.rig_files.column_names import DIMENSION, holds, is_unit, parse_unit, split_name, words, words_of
+from mrdamper.rig_files.column_names import (
+    DIMENSION,
+    find_name,
+    holds,
+    is_unit,
+    parse_unit,
+    split_name,
+    words,
+    words_of,
+)
 from mrdamper.rig_files.conditions import currents_in, named_after_currents, rate_in_name, stated_rate
-from mrdamper.rig_files.profile import Profile
+from mrdamper.rig_files.profile import Profile, toml
 from mrdamper.rig_files.readers.base import RawTable, RigFileError
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED, SIGNED, Finding
 
@@ -28,6 +37,7 @@ _INDEX, _MEASURED = words("sample"), words("measured")
 _TIMES = re.compile(r"(?i)(?<!\w)multipl(?:y|ie[ds]?|ier|iz|ic|ik)\w*")  # no multiple, no multiplexer
 _CONVERTER = re.compile(r"(?i)(?<![a-z])(?:adc|counts?|raw|cnts?)(?![a-z])")  # of a converter
 _FACTOR = re.compile(r"(?<![\w.,])[0-9]+(?:[.,][0-9]+)?(?!\w)")
+_SUM = re.compile(r"(?i)(?<!\w)(?:sum|summe|somme|suma|somma|soma|toplam|сумма)(?!\w)|合[計计]|之和|总和")
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,6 +254,7 @@ def _choose(table: RawTable, role: str, taken: Collection[int]) -> int | None:
         return free[0] if len(free) == 1 == len(fitting) else None
     candidates = fitting or named
     names = [headers[i].name.casefold() for i in candidates]
+    _refuse_sum(table, role, candidates if role in SIGNED else ())
     if len(set(names)) > 1:
         measured = [i for i in candidates if holds(headers[i].name, _MEASURED)]
         if len(measured) == 1:
@@ -259,8 +270,52 @@ def _choose(table: RawTable, role: str, taken: Collection[int]) -> int | None:
         if role not in REQUIRED:
             return None
         if len({headers[i].unit for i in candidates}) < len(candidates) or not _are_alike(table, candidates):
-            raise _ambiguous(table, role, [table.names[i] for i in candidates])
+            raise _ambiguous(table, role, candidates)
     return candidates[0]
+
+
+def _refuse_sum(table: RawTable, role: str, columns: Collection[int]) -> None:
+    """Refuse columns of a channel that a line beside them adds up: damper force = Load_1 + Load_2."""
+    for line in table.lines if columns else ():
+        places = {i: place for i in table.columns(role) if (place := find_name(line, table.headers[i].name))}
+        totals = {i for i, place in places.items() if "=" in line[place.end() :]}
+        terms = [i for i in places if i not in totals]
+        inner = line[
+            min((places[i].end() for i in terms), default=0) : max((places[i].start() for i in terms), default=0)
+        ]
+        added = len(terms) > 1 and ("+" in inner or _SUM.search(line))
+        if added and not {*columns}.isdisjoint(terms) and totals.isdisjoint(columns):
+            first, *others = (toml(table.names[i]) for i in terms)
+            remedy = f"set [channels.{role}] column = {first} and add = [{', '.join(others)}] in a profile"
+            remedy += f", or its column and add = [] if one of them is the whole {role}"
+            problem = f"the {role} may be a sum by the line {line.strip()[:120]!r}"
+            raise table.source.refuse("E_AMBIGUOUS", problem, remedy, line=table.line)
+
+
+def with_sums(table: RawTable, profile: Profile) -> RawTable:
+    """Return the table with the columns that a profile adds to those of channels added to them, each by its unit.
+
+    Raises `ColumnError` for one that is not there, or has a unit of something else.
+    """
+    for role, channel in ((role, of) for role, of in profile.channels.items() if of.add and of.column is not None):
+        try:
+            own = column_called(table, channel.column or "", role)
+        except ColumnError:  # as of another table of the file
+            continue
+        further = [column_called(table, column, role, f"add of [channels.{role}]") for column in channel.add]
+        headers, shares = table.headers, {own: 1.0}
+        for i in further:
+            if headers[i].dimension != headers[own].dimension:
+                problem = f"{table.names[i]!r} is not in a unit of {table.names[own]!r} and cannot be added to it"
+                raise _refusal(UnitError, table, problem, f"correct add of [channels.{role}]", "E_UNITS_DIMENSION")
+            shares[i] = headers[i].factor / headers[own].factor
+
+        def added(values: Mapping[int, Floats], shares: Mapping[int, float] = shares) -> Floats:
+            return np.sum([factor * values[i] for i, factor in shares.items()], axis=0)
+
+        text = f"the {role} is the sum of {' and '.join(repr(table.names[i]) for i in shares)}, as the profile states"
+        table = table.computed(own, [*shares], added).noted(Finding("W_CHOSEN", text))
+    return table
 
 
 def column_called(table: RawTable, column: str | int, what: str, key: str = "") -> int:
@@ -316,10 +371,12 @@ def _missing(table: RawTable, columns: Mapping[str, int], profile: Profile) -> l
     return [_refusal(ColumnError, table, f"no column is known to be {r} {beside}", remedies[r]) for r in missing]
 
 
-def _ambiguous(table: RawTable, role: str, names: Sequence[str]) -> RigFileError:
-    shown = " and ".join(repr(name) for name in names[:3])
+def _ambiguous(table: RawTable, role: str, columns: Sequence[int]) -> RigFileError:
+    problem = f"{' and '.join(repr(table.names[i]) for i in columns[:3])} may both be the {role}"
+    about = [line.strip()[:120] for line in table.lines if any(find_name(line, table.headers[i].name) for i in columns)]
+    problem += f"; beside them stands {' and '.join(map(repr, about[:2]))}" if about else ""
     remedy = f'set [channels.{role}] column = "..."{_or_split(table)} in a profile'
-    return table.source.refuse("E_AMBIGUOUS", f"{shown} may both be the {role}", remedy, line=table.line)
+    return table.source.refuse("E_AMBIGUOUS", problem, remedy, line=table.line)
 
 
 def _or_split(table: RawTable) -> str:
@@ -359,6 +416,7 @@ def _convert(table: RawTable, role: str, column: int, profile: Profile, asks_cur
     if role in SIGNED and channel.scale is None:
         _refuse_volts_beside(table, role, profile)
         _refuse_factor(table, role, unit)
+        _refuse_sum(table, role, [column] if "add" not in channel.model_fields_set else ())
     si = parse_unit(unit) or column_names.Unit("", 1.0)
     sign = sign or 1
     shift = 0.0 if channel.integrate else sign * (si.factor * channel.offset + si.offset)
@@ -475,7 +533,7 @@ def _second_clock(table: RawTable, time: Assigned) -> list[InputError]:
                 continue
         coarse = float(np.max(np.abs(np.diff(two)), initial=0.0))  # a clock that shows whole seconds
         if np.ptp(two) > 0 and np.max(np.abs(one - two)) > 1.5 * coarse + 1e-3 * float(np.ptp(one)):
-            return [_ambiguous(table, "time", [table.names[time.column], table.names[other]])]
+            return [_ambiguous(table, "time", [time.column, other])]
     return []
 
 

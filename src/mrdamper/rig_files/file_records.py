@@ -21,7 +21,7 @@ from mrdamper.data.temporary import temporary_folder
 from mrdamper.errors import ColumnError, CombinedError, InputError, listed, printable
 from mrdamper.rig_files.coil_current import as_data, ask_current_too, with_value_of_name
 from mrdamper.rig_files.column_names import COMPUTED, Header, holds, words, words_of
-from mrdamper.rig_files.columns import assign, partly_assigned
+from mrdamper.rig_files.columns import assign, partly_assigned, with_sums
 from mrdamper.rig_files.mapping.clocks import with_time_stated
 from mrdamper.rig_files.mapping.completion import completed
 from mrdamper.rig_files.mapping.description import READ_FOLDERS, with_description, with_notes
@@ -126,7 +126,7 @@ def test_tables(tables: list[RawTable], profile: Profile) -> list[RawTable]:
         raise tables[0].source.refuse("E_NO_DATA", "every table is left out", "correct [file] leave_out of the profile")
     tables = [t for t, out in zip(tables, omitted, strict=True) if not out or t.label.startswith("block")]  # numbered
     tables = with_joined_rasters([with_time_stated(completed(with_channels_as_columns(table))) for table in tables])
-    tables = [with_one_clock(table) for table in tables]
+    tables = [with_one_clock(with_sums(table, profile)) for table in tables]
     forms = [form_of_tests(table, profile.file) for table in tables]
     stated = {name: channel.column for name, channel in profile.channels.items() if channel.column is not None}
     parts = [part for t, form in zip(tables, forms, strict=True) for part in tests_of(t, form, stated)]

@@ -70,6 +70,8 @@ class Channel(Table):
 
     column: NAME | Annotated[int, Field(ge=1, le=1000)] | None = None
     """Name of the column, or its number counted from one."""
+    add: tuple[NAME | Annotated[int, Field(ge=1, le=1000)], ...] = Field(default=(), max_length=20, strict=False)
+    """Further columns that are added to it, as the load cells of two rods are; none where a column is the sum."""
     unit: NAME | None = None
     """Of the numbers, or of the numbers times `scale`."""
     sign: Literal[1, -1] = 1
@@ -234,7 +236,8 @@ def profile_text(profile: Profile, unset: Mapping[str, Sequence[str]] = MappingP
     sections = {"file": profile.file.model_dump(exclude_none=True, exclude_defaults=True)}
     for name, channel in profile.channels.items():
         says = channel.model_dump(exclude_none=True, exclude_defaults=True)
-        sections[f"channels.{name}"] = says | ({"sign": channel.sign} if "sign" in channel.model_fields_set else {})
+        stated = {key: getattr(channel, key) for key in ("sign", "add") if key in channel.model_fields_set}
+        sections[f"channels.{name}"] = says | stated
     for name in ("current", "correction"):
         table = getattr(profile, name)
         sections[name] = {} if table is None else table.model_dump(exclude_none=True, exclude_unset=True)

@@ -11,7 +11,17 @@ from pathlib import Path
 import numpy as np
 
 from mrdamper.rig_files import column_names, conditions
-from mrdamper.rig_files.column_names import DIMENSION, SI, Header, is_unit, role_of, sentences, split_name, words
+from mrdamper.rig_files.column_names import (
+    DIMENSION,
+    SI,
+    Header,
+    find_name,
+    is_unit,
+    role_of,
+    sentences,
+    split_name,
+    words,
+)
 from mrdamper.rig_files.conditions import LONGEST_LINE, currents_in, damper_in, without_currents
 from mrdamper.rig_files.mapping import scales
 from mrdamper.rig_files.mapping.clocks import with_axis_as_time, with_epoch
@@ -306,12 +316,12 @@ def _with_explained_names(table: RawTable) -> RawTable:
     """Names of columns that say nothing, with what a line that begins with each says: PT07;Stroke;mm; y0 = load, N."""
     lines = [[cell.strip(' "') for cell in _CELLS_OF_NAME.split(line.strip(" |"))] for line in table.lines]
     parts = {cells[0] for cells in lines if len(cells) > 1 and re.search(r"[^\W\d_].*[0-9]", cells[0])}
-    parts = {part: [scales.has_name(name, part) for name in table.names] for part in parts}  # ai0 of Voltage - ai0
+    names_of = {part: [i for i, name in enumerate(table.names) if find_name(name, part)] for part in parts}
     headings = {}
     for i, (name, header) in enumerate(zip(table.names, table.headers, strict=True)):
         voltage = header.role == "voltage"
         called = {name.casefold(), header.name.casefold()} - {""}
-        called |= {part.casefold() for part, of in parts.items() if voltage and of[i] and sum(of) == 1}
+        called |= {part.casefold() for part, of in names_of.items() if voltage and of == [i]}  # ai0 of Voltage - ai0
         own = [cells[1:] for cells in lines if (header.role is None or voltage) and cells[0].casefold() in called]
         cells = own[0] if own and own.count(own[0]) == len(own) else []
         scaled = [cell for cell in cells if scales.scales_in(cell)]
@@ -417,7 +427,8 @@ def _with_listed_units(table: RawTable) -> RawTable:
     units = {i: own.pop() for i, own in stated.items() if len(own | doubtful.get(i, set())) == 1}
     of_name = {names[i]: unit for i, unit in units.items()}
     constants = {f"{name} [{of_name[name]}]" if name in of_name else name: v for name, v in table.constants.items()}
-    return replace(table, constants=constants).named({i: (names[i], units[i]) for i in bare if i in units})
+    alike = {i: (names[i], of_name[names[i]]) for i in bare if names[i] in of_name}  # also the force at another current
+    return replace(table, constants=constants).named(alike)
 
 
 def item_of(text: str) -> Header:

@@ -21,7 +21,16 @@ import numpy as np
 
 from mrdamper.errors import InputError
 from mrdamper.rig_files import column_names
-from mrdamper.rig_files.column_names import UNIT_KEYS, is_unit, names_condition, sentences, split_name, words, words_of
+from mrdamper.rig_files.column_names import (
+    UNIT_KEYS,
+    find_name,
+    is_unit,
+    names_condition,
+    sentences,
+    split_name,
+    words,
+    words_of,
+)
 from mrdamper.rig_files.conditions import (
     OTHER_DEVICE,
     stated_by_lines,
@@ -34,7 +43,7 @@ from mrdamper.rig_files.mapping.completion import NUMBERED, item_of, said_of_fil
 from mrdamper.rig_files.mapping.result_tables import numbered_tests, with_small_units
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import RawTable
-from mrdamper.rig_files.record import REQUIRED, Finding
+from mrdamper.rig_files.record import REQUIRED, SIGNED, Finding
 from mrdamper.rig_files.text.elements import numbers_in, root_of, tree_of
 from mrdamper.rig_files.text.row_samples import cells_of_list
 from mrdamper.rig_files.text.stream import decoded
@@ -92,7 +101,9 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     lines = [line for text in sorted(texts) if len(own := short_lines(text)) <= _MOST for line in own]
     names = {header.name.casefold() for header in table.headers}
     counts, of_file = partial(scales.counts_in, names=names), partial(said_of_file, name=path.name)
+    alike = [h.name for h in table.headers if h.role in SIGNED and len(table.columns(h.role)) > 1]
     about = [scales.states_sign, counts, partial(column_names.units_in, names=names), of_file]
+    about.append(lambda line: any(find_name(line, name) for name in alike))
     # A current may be that of one test, or an example.
     lines = [line for line in lines if not (stated_by_lines([line], ".") or stated_in_titles([line]))]
     stated = [(lacking and _of_channels(line)) or line * any(tells(line) for tells in about) for line in lines]

@@ -12,7 +12,16 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.data.arrays import rescale
 from mrdamper.rig_files import column_names
-from mrdamper.rig_files.column_names import DIMENSION, holds, parse_unit, role_of, split_name, words, words_of
+from mrdamper.rig_files.column_names import (
+    DIMENSION,
+    find_name,
+    holds,
+    parse_unit,
+    role_of,
+    split_name,
+    words,
+    words_of,
+)
 from mrdamper.rig_files.conditions import FULL_SCALES, LONGEST_LINE, stated_by_lines, stated_in_titles
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import SIGNED, Finding
@@ -135,17 +144,12 @@ def _shifted_elsewhere(table: RawTable, column: int, own: str, role: str) -> boo
             continue
         if split_name("", number[2]).dimension not in (None, *_SIGNALS, DIMENSION.get(role)):
             continue
-        columns = {i for i, header in enumerate(table.headers) if has_name(line, header.name)}
+        columns = {i for i, header in enumerate(table.headers) if find_name(line, header.name)}
         roles = {role_of(word) for word in words_of(line) if len(word) > 2}
         about_none = not columns and not roles - {None, "voltage", role} and match.start() == 0
-        if column in columns or has_name(line, label) or about_none:
+        if column in columns or find_name(line, label) or about_none:
             return True
     return False
-
-
-def has_name(line: str, name: str) -> bool:
-    """Tell if a line has a name as a word of its own."""
-    return bool(name) and re.search(rf"(?<!\w){re.escape(name)}(?!\w)", line, re.IGNORECASE) is not None
 
 
 def scaled_columns(table: RawTable) -> list[int]:
@@ -178,7 +182,7 @@ def _stated_scale(table: RawTable, column: int, volts: Sequence[int]) -> tuple[s
                 has = any(header.dimension == DIMENSION.get(role) for header in table.headers)
                 if role not in ("", "voltage", "time") and meant and not has:
                     scales.append((role, unit, factor, line))
-        scales = [entry for entry in scales if has_name(entry[3], name)] or scales
+        scales = [entry for entry in scales if find_name(entry[3], name)] or scales
         if scales:
             return scales[0] if len({entry[:3] for entry in scales}) == 1 else None
     return None
