@@ -6,14 +6,17 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+import scipy.io
 from support.rig_files import tdms_bytes
 
 from mrdamper.errors import InputError
 from mrdamper.rig_files.column_names import units_in
 from mrdamper.rig_files.preview import guess_profile
-from mrdamper.rig_files.profile import parse_profile
+from mrdamper.rig_files.profile import parse_profile, profile_text
+from mrdamper.rig_files.profile_template import profile_template
 from mrdamper.rig_files.readers.arrays import unit_in
-from mrdamper.rig_files.rig_import import import_files, read_run, read_runs
+from mrdamper.rig_files.rig_import import found_tests, import_files, read_run, read_runs
+from mrdamper.rig_files.tests_table import tests_text
 
 T = np.arange(0.0, 4.0, 0.005)
 V = np.cos(2 * np.pi * T)
@@ -391,6 +394,32 @@ def test_a_column_that_numbers_the_tests_is_joined_with_the_plan_by_its_key(tmp_
     )  # rows of several currents are no one value, whatever number the file's name ends in
     assert not result.records
     assert "E_CURRENT_MISSING" in {r.error.code for r in result.refusals}
+
+
+@pytest.mark.parametrize("keys", [("test_id", "id"), ("exp_key", "exp_key"), ("Step", "Step")])
+def test_a_table_with_a_row_for_each_test_is_no_logger_though_it_has_the_start_of_each(tmp_path, keys):
+    samples, tests = f"{keys[0]},ts,disp_mm,force_N\n", f"{keys[1]},started_at,current_mA\n"
+    for number, (frequency, amperes) in enumerate(STEPS, 11):
+        x, f = motion(frequency, amperes, number)
+        stamps = [f"2025-03-04 10:{number}:{t:06.3f}" for t in T]
+        cells = zip(stamps, rows(x, f).splitlines(), strict=True)
+        samples += "".join(f"{number},{stamp},{row}\n" for stamp, row in cells)
+        tests += f"{number},{stamps[0]},{1e3 * amperes:g}\n"
+    (tmp_path / "samples.csv").write_text(samples)
+    (tmp_path / "tests_done.csv").write_text(tests)
+    assert by_id(import_files([tmp_path])) == {f"samples_{n}": i for n, (_, i) in enumerate(STEPS, 11)}
+
+
+@pytest.mark.parametrize("shared", [(), ("x",)])
+def test_variables_at_each_current_have_the_unit_that_a_text_gives_their_letter(tmp_path, shared):
+    tree = {"t": T, "info": "time t in s, displacement x in m, force F in N"} | ({"x": X / 1e3} if shared else {})
+    for n, amperes in enumerate((0.0, 0.5, 1.5)):
+        tag = f"{amperes:.1f}A".replace(".", "p")
+        tree |= {f"F_{tag}": force(amperes, n)} | ({} if shared else {f"x_{tag}": X / 1e3 + 1e-4 * n})
+    scipy.io.savemat(tmp_path / "sine.mat", tree)
+    result = import_files([tmp_path])
+    assert not result.refusals
+    assert currents(result.records) == [0.0, 0.5, 1.5]
 
 
 @pytest.mark.parametrize(("between", "joined"), [(0.0, True), (1.0, False)])
@@ -1423,6 +1452,70 @@ def test_one_remedy_leaves_out_every_test_that_a_plan_discards(tmp_path):
     assert [remedy.split(" in a profile")[0] for remedy in remedies] == [
         'set [file] leave_out = ["run_1.csv", "run_3.csv"]'
     ]
+    records, _ = found_tests([tmp_path])
+    assert [line.split(",")[2] for line in tests_text(records).splitlines()] == ["current_A", "", "0.5", ""]
+    (tmp_path / "tests.csv").write_text("file,current_A\nrun_1.csv,0.25\nrun_3.csv,0.75\n")  # both are valid
+    result = import_files([tmp_path])
+    assert by_id(result) == {"run_1": 0.25, "run_2": 0.5, "run_3": 0.75}
+    assert any("tests.csv decides: plan.csv has the remark" in finding.text for finding in result.records[0].findings)
+
+
+@pytest.mark.parametrize("line", ["damper force = Load_1 + Load_2", "Load_1, Load_2: force is the sum of both"])
+def test_a_force_that_is_a_sum_of_columns_is_asked_for_and_added_up(tmp_path, line):
+    f = force(0.5)
+    text = "Time (s),Stroke (mm),Load_1 (kN),Load_2 (N)\n" + rows(T, X, 0.6e-3 * f, 0.4 * f)
+    (tmp_path / "a_0.5A.csv").write_text(f"# {line}\n{text}")
+    for half in ("", 'column = "Load_2 (N)"'):
+        (refusal,) = import_files([tmp_path], parse_profile(f"[channels.force]\n{half}")).refusals
+        assert refusal.error.code == "E_AMBIGUOUS"
+        assert line in refusal.error.found
+    remedy = refusal.error.remedy.removeprefix("set [channels.force] ").split(" in a profile")[0].replace(" and ", "\n")
+    (record,) = import_files([tmp_path], parse_profile(f"[channels.force]\n{remedy}")).records
+    assert record.force == pytest.approx(f, abs=0.02)
+    alone = parse_profile('[channels.force]\ncolumn = "Load_2 (N)"\nadd = []')
+    assert parse_profile(profile_text(alone)) == alone
+    (record,) = import_files([tmp_path], alone).records
+    assert record.force == pytest.approx(0.4 * f, abs=0.02)
+    (tmp_path / "a_0.5A.csv").write_text("# Load = Load_1 + Load_2\n" + text.replace("Load_2 (N)", "Load (N)"))
+    (record,) = import_files([tmp_path]).records
+    assert record.force == pytest.approx(0.4 * f, abs=0.02)
+
+
+def test_what_a_readme_states_of_columns_that_may_be_one_channel_is_quoted(tmp_path):
+    heads = "Time (s),Crosshead Disp (mm),Rod LVDT (mm),Force (N)\n"
+    (tmp_path / "a_0.5A.csv").write_text(heads + rows(T, 1.1 * X, X, force(0.5)))
+    (tmp_path / "README.txt").write_text("Rod LVDT: stroke of the damper\nCrosshead Disp: with the frame's, not used\n")
+    (refusal,) = import_files([tmp_path]).refusals
+    assert "with the frame's, not used" in refusal.error.found
+    assert "stroke of the damper" in refusal.error.found
+
+
+def test_a_profile_can_be_written_for_a_file_whose_form_is_not_found(tmp_path):
+    path = tmp_path / "a_0.5A.csv"
+    path.write_text("time,disp,load,extra\n" + rows(T, X, force(0.5)))
+    text, (problem,) = profile_template([path], parse_profile(""))
+    assert "E_FIELD_COUNT" in problem
+    answered = text.replace("#names", "names").replace("#data_line =", "data_line = 2")
+    (record,) = import_files([path], parse_profile(answered)).records
+    assert record.force == pytest.approx(force(0.5), abs=1e-4)
+
+
+def test_lines_above_the_rows_may_begin_with_a_label_each(tmp_path):
+    heads = '"No","Elapsed","CH-1","CH-2"\n"Name","","Stroke","Load"\n"Range","","OFF","5000"\n"Unit","s","mm","kN"\n'
+    (tmp_path / "a_0.5A.csv").write_text(heads + rows(T, X, force(0.5) / 1e3))
+    (record,) = import_files([tmp_path]).records
+    assert record.force == pytest.approx(force(0.5), abs=0.02)
+
+
+def test_units_in_an_object_are_those_of_columns_in_a_list_beside_it(tmp_path):
+    runs = [
+        {"id": n, "params": {"current": i}, "rows": np.column_stack([T, X, force(i, n)]).round(4).tolist()}
+        for n, i in enumerate((0.0, 0.5))
+    ]
+    heads = {"columns": ["time", "displacement", "force"], "units": {"time": "s", "displacement": "mm", "force": "N"}}
+    heads["units"]["current"] = "A"
+    (tmp_path / "rig.json").write_text(json.dumps({**heads, "runs": runs}))
+    assert currents(import_files([tmp_path]).records) == [0.0, 0.5]
 
 
 @pytest.mark.parametrize("plan", ["Run,Current [A],Remark\n{}", "Current [A],Remark\n{}"], ids=["numbered", "in order"])
@@ -1568,7 +1661,11 @@ def test_a_plan_on_a_sheet_of_its_tests_is_compared_with_their_motion_and_its_re
     ("line", "contradicts"),
     [
         ("Note: the force column is in N (the header of the template says kN).", True), ("Force: N", True),
-        ("All forces in N.", True),
+        ("All forces in N.", True), ("| force | load cell | N |", True),
+        ("Columns: time: t in s; force: load in N", True),
+        ("Spalten: Zeit in s, Kraft in N", True), ("Columnas: tiempo en s, fuerza en N.", True),
+        ("| force | peak | 900 N |", False),
+        ("Colonnes du tableau 2: force en N", False),
         ("| force | N |", True), ("Kraft in kN", False), ("load cell: 25 N", False), ("peak forces in N", False),
         ("The forces of the paper are in N", False), ("Force in N (until 2020); force in kN (since 2021)", False),
     ],
