@@ -4,11 +4,18 @@ import math
 
 import numpy as np
 import pytest
-from scipy.special import stdtrit
+from scipy.special import fdtrc, stdtrit
 
 from mrdamper.data import Condition
 from mrdamper.errors import InputError
-from mrdamper.identification.intervals import dof_of_quantile, interval_about, student, weaknesses, written
+from mrdamper.identification.intervals import (
+    dof_of_quantile,
+    f_exceedance,
+    interval_about,
+    student,
+    weaknesses,
+    written,
+)
 
 
 @pytest.mark.parametrize("level", [0.5, 0.9, 0.95, 0.999])
@@ -30,6 +37,12 @@ def test_degrees_of_freedom_are_those_whose_quantile_was_given(level):
         1.0
     )  # wider than with one: one all the same
     assert dof_of_quantile(0.9 * student(level, 1e6), level) == pytest.approx(1e6, rel=1e-9)
+
+
+@pytest.mark.parametrize("dof", [(1, 1), (1, 12), (4, 22), (7, 2), (30, 1000), (900, 5)])
+@pytest.mark.parametrize("ratio", [0.0, 1e-4, 0.7, 1.0, 1.3, 5.0, 40.0, 1e5])
+def test_the_exceedance_of_a_ratio_of_variances_is_scipys(dof, ratio):
+    assert f_exceedance(ratio, *dof) == pytest.approx(fdtrc(*dof, ratio), rel=1e-10, abs=1e-13)
 
 
 @pytest.mark.parametrize("level", [0.0, 1.0, -1.0, float("nan")])

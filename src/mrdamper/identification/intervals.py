@@ -21,6 +21,7 @@ _SERIES_DEGREES_OF_FREEDOM = 1000.0  # degrees of freedom from which the series 
 _MOST_DEGREES_OF_FREEDOM, _HALVINGS = 1e6, 30  # that a quantile is looked for in, and steps of bisection
 _RULE_END, _NODES = 3.2, 81  # of the tanh-sinh rule: the weights beyond its end are below rounding
 _MAX_NEWTON_STEPS = 200  # of Newton's method
+_FRACTION_TERMS = 200  # pairs of terms of a continued fraction
 _LOPSIDED = 0.1  # share of an interval's half width: less asymmetric, it is written with ±
 
 
@@ -61,6 +62,23 @@ def _tanh_sinh() -> tuple[Floats, Floats]:
     at = np.linspace(-_RULE_END, _RULE_END, _NODES)
     inner = np.pi / 2 * np.sinh(at)
     return np.tanh(inner), (at[1] - at[0]) * np.pi / 2 * np.cosh(at) / np.cosh(inner) ** 2
+
+
+def f_exceedance(ratio: float, dof_above: float, dof_below: float) -> float:
+    """Probability that the ratio of two estimates of one variance is larger, of F's distribution, to 1e-10.
+
+    An incomplete beta function [Abramowitz and Stegun 1972, 26.6.2 and 26.5.8], whose import from SciPy is slow.
+    """
+    a, b, share = dof_below / 2, dof_above / 2, dof_below / (dof_below + dof_above * ratio)
+    if share > (a + 1) / (a + b + 2):  # where the continued fraction of the other share converges faster
+        return 1 - f_exceedance(1 / ratio, dof_below, dof_above) if ratio > 0 else 1.0
+    fraction = 1.0
+    for m in range(_FRACTION_TERMS, 0, -1):
+        odd = -(a + m) * (a + b + m) * share / ((a + 2 * m) * (a + 2 * m + 1))
+        fraction = 1 + m * (b - m) * share / ((a + 2 * m - 1) * (a + 2 * m)) / (1 + odd / fraction)
+    log_beta = math.lgamma(a) + math.lgamma(b) - math.lgamma(a + b)
+    front = math.exp(a * math.log(share) + b * math.log1p(-share) - log_beta) / a
+    return front / (1 - (a + b) * share / (a + 1) / fraction)
 
 
 def dof_of_quantile(quantile: float, level: float) -> float:

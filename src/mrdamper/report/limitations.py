@@ -7,7 +7,6 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
-from scipy.special import fdtrc
 
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.coil import Coil
@@ -19,6 +18,7 @@ from mrdamper.data import Floats, Run, session_of
 from mrdamper.data.wording import counted, number
 from mrdamper.errors import InputError, listed
 from mrdamper.identification import Identification
+from mrdamper.identification.intervals import f_exceedance
 from mrdamper.identification.loop_analysis import LoopAnalysis
 from mrdamper.physics.motion.sines import MIN_CYCLES
 from mrdamper.study.contradictions import MIN_RUNS
@@ -190,7 +190,7 @@ def _sessions(runs: Iterable[Run], train: Validation) -> list[str]:
         within = sum(float(np.sum((group - group.mean()) ** 2)) for group in groups) / more
         between = float(np.dot(weights, (means - np.average(means, weights=weights)) ** 2)) / (len(groups) - 1)
         scale = 1.0 if what == "gain" else float(np.median([one.pp for of in own for one in of]))
-        by_chance = fdtrc(len(groups) - 1, more, between / (within or 1e-12))
+        by_chance = f_exceedance(between / (within or 1e-12), len(groups) - 1, more)
         if by_chance < _CHANCE and np.ptp(means) > least * scale:
             all_shown = len(names) <= _MAX_RUNS
             shown = range(len(names)) if all_shown else (int(np.argmin(means)), int(np.argmax(means)))

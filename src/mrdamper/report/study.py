@@ -17,9 +17,7 @@ from mrdamper.dampers.uncertainty import table
 from mrdamper.data.atomic import ResultRecord, publish
 from mrdamper.data.encoding import csv_text, file_names
 from mrdamper.data.progress import Progress, silent
-from mrdamper.data.runs import once_per_run
 from mrdamper.data.wording import counted, raised, span
-from mrdamper.errors import IdentificationError
 from mrdamper.identification import Identification
 from mrdamper.identification.characteristics import Characteristics
 from mrdamper.identification.intervals import written
@@ -45,7 +43,6 @@ from mrdamper.report.summary import error_sentence, omission_lines
 from mrdamper.report.tables import identification_rows, score_rows
 from mrdamper.study.processes import IN_PROCESS, Processes
 from mrdamper.study.recipe import RecipeResult
-from mrdamper.study.usable_runs import characterise_usable
 from mrdamper.study.workflow import RigStudy, Study
 
 _LOOPS_SHOWN = 6
@@ -164,12 +161,8 @@ def _shown(rig: RigStudy) -> list[Any]:
     return spread_out(ordered, _LOOPS_SHOWN)
 
 
-@once_per_run
 def _measured(rig: RigStudy) -> dict[str, Characteristics]:
-    try:
-        return {rig.dataset.name: characterise_usable(rig.dataset, compared=True)}
-    except IdentificationError:
-        return {}
+    return {rig.dataset.name: rig.measured} if rig.measured else {}
 
 
 def _chapter(rig: RigStudy, pictures: Mapping[str, Picture], limits: Sequence[Limit]) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from mrdamper.data.displayable import joined
 from mrdamper.data.progress import Progress, silent
 from mrdamper.data.wording import counted
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError, validate_arguments
+from mrdamper.identification.characteristics import Characteristics
 from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, at_levels, dynamic_ranges
 from mrdamper.statistics.functions.selection import mean_error, smaller_wins
 from mrdamper.statistics.linear import on_one_blas_thread
@@ -41,7 +42,7 @@ from mrdamper.study.recipe import (
     recipes_of_study,
     study_methods,
 )
-from mrdamper.study.usable_runs import UsableRuns
+from mrdamper.study.usable_runs import UsableRuns, characterise_usable
 from mrdamper.study.validation import RunScore, Validation, validate
 
 CONDITION = "condition"  # kind of fold: the runs of one condition, a stretch of another record
@@ -86,6 +87,7 @@ class RigStudy(Displayable):
     # runs that were set aside because they contradict the others; `dataset` is without them
     contradictions: tuple[Contradiction, ...] = ()
     comparison_notes: tuple[str, ...] = ()  # of the comparison of the runs with each other
+    measured: Characteristics | None = None  # of the runs, without a model; None where no cycle is steady
 
     @property
     def omitted(self) -> dict[str, str]:
@@ -289,7 +291,16 @@ def study_rig(
     return RigStudy(
         rig, dataset, loops, dynamic_ranges(loops), tuple(candidates), runs.not_identified, impossible,
         model is not None, sessions_note, tuple(runs.comparison.contradictions), runs.comparison.notes,
+        _measured(dataset),
     )  # fmt: skip
+
+
+def _measured(dataset: Dataset) -> Characteristics | None:
+    """Characterise compared runs in the process of their study, which has checked them."""
+    try:
+        return characterise_usable(dataset, compared=True)
+    except IdentificationError:
+        return None
 
 
 def _require_runs(sines: Sequence[Run], usable: Sequence[Run], unusable: Mapping[str, str], where: str) -> None:
