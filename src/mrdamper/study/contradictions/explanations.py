@@ -66,6 +66,9 @@ class Trial:
         return abs(self.value - other.value) <= 0.1 * max(abs(self.value), abs(other.value))
 
 
+_ALONE = Trial("damper", 1.0, "", _ALONE_ODDS)  # of a run without an explanation
+
+
 @dataclass(frozen=True, eq=False)
 class Explanation:
     """Change of a run's data with which it agrees with the others."""
@@ -93,16 +96,30 @@ class ExplanationCandidate:
         self._usual_step = float(np.median([track.step for track in self._others]))
         self._motions: list[tuple[Trial, RowProducts]] = []
 
-    def explanations(self, others: Posterior, like: Sequence[Trial] = ()) -> list[Explanation]:
+    def explanations(self, others: Posterior) -> list[Explanation]:
         """Explanations that are more than differences between sessions, the most probable first.
 
-        `others` are coefficients by the other runs. Only explanations like one of some trials are looked at, if there
-        are any.
+        `others` are coefficients by the other runs.
         """
-        changes = list(self._trials(others, like))
+        return self.explanations_of_each([self], others)[0]
+
+    @staticmethod
+    def explanations_of_each(
+        candidates: Sequence[ExplanationCandidate], others: Posterior, like: Sequence[Trial] = ()
+    ) -> list[list[Explanation]]:
+        """Explanations of several runs, which are weighed at once; if there are some trials, only those like one."""
+        versions = [candidate._versions(others, like) for candidate in candidates]
+        products = [each for of in versions for _, each in of]
+        odds = iter(others.log_probabilities(others.weigh(products)))
+        return [one._ranked(of, [next(odds) for _ in of]) for one, of in zip(candidates, versions, strict=True)]
+
+    def _versions(self, others: Posterior, like: Sequence[Trial]) -> list[tuple[Trial, RowProducts]]:
+        """Return the run as it is, with the most probable zero of its force, and as corrected by every trial."""
         zero = next(self._of_the_force(others))
-        versions = [self.own, self.changed(zero), *(products for _, products in changes)]
-        least, at_zero, *odds = others.log_probabilities(others.weigh(versions))
+        return [(_ALONE, self.own), (zero, self.changed(zero)), *self._trials(others, like)]
+
+    def _ranked(self, versions: Sequence[tuple[Trial, RowProducts]], odds: Sequence[float]) -> list[Explanation]:
+        (least, at_zero, *odds), (_, (zero, _), *changes) = odds, versions
         candidates: list[Explanation] = []
         for (trial, products), logarithm in zip(changes, odds, strict=True):
             if trial.cause == "sign" and at_zero > logarithm - _CLEAR_ODDS:
@@ -116,12 +133,19 @@ class ExplanationCandidate:
 
     def alone(self, others: Posterior) -> Explanation:
         """Return the explanation without a change: the run is of another damper."""
-        prior = self.evidence.prior
-        own = others.weigh([self.own])
-        gain = prior.log_probabilities(own)[0] - _ALONE_ODDS - others.log_probabilities(own)[0]
-        if self.own.unexplained(others.at(self.own.over)[0], MAX_SESSION_GAIN) < MIN_UNEXPLAINED * self.own.size:
-            gain = -np.inf
-        return Explanation(Trial("damper", 1.0, "", _ALONE_ODDS), gain, self.own)
+        return self.alone_of_each([self], others)[0]
+
+    @staticmethod
+    def alone_of_each(candidates: Sequence[ExplanationCandidate], others: Posterior) -> list[Explanation]:
+        """Explanations of several runs without a change, which are weighed at once."""
+        own = others.weigh([candidate.own for candidate in candidates])
+        odds = zip(others.evidence.prior.log_probabilities(own), others.log_probabilities(own), strict=True)
+        return [candidate._alone(others, *each) for candidate, each in zip(candidates, odds, strict=True)]
+
+    def _alone(self, others: Posterior, free: float, expected: float) -> Explanation:
+        unexplained = self.own.unexplained(others.at(self.own.over)[0], MAX_SESSION_GAIN)
+        gain = free - _ALONE_ODDS - expected if unexplained >= MIN_UNEXPLAINED * self.own.size else -np.inf
+        return Explanation(_ALONE, gain, self.own)
 
     def changed(self, trial: Trial) -> RowProducts:
         """Products of the run as corrected by a trial of force, offset or current."""

@@ -519,10 +519,10 @@ class Search:
         others = self.evidence.posterior([self._members[k] for k in rest])
         kept, own = [self._products[k] for k in rest], [self._products[k] for k in group]
         base = self._base + _MEMBER_ODDS * (len(group) - 1)
-        first, *rest_of_group = (self._candidates[k] for k in group)
+        first, *rest_of_group = candidates = [self._candidates[k] for k in group]
         compared = first.explanations(others)[:_COMPARED_EXPLANATIONS]
         trials = [explanation.trial for explanation in compared]
-        options = [compared, *(one.explanations(others, trials) for one in rest_of_group if compared)]
+        options = [compared, *(first.explanations_of_each(rest_of_group, others, trials) if compared else ())]
         best, joint = _NO_PROPOSAL, -np.inf
         for explanation in compared:
             if explanation.cause == "current" and not self._may_share(group, explanation.trial.value):
@@ -544,7 +544,7 @@ class Search:
             corrected = [e.products for e in best.explanations.values()]
             gain = self._adapted([*kept, *corrected], others) - base - best.gain
             best = JointExplanation({k: replace(e, gain=gain) for k, e in best.explanations.items()}, gain)
-        alone = [self._candidates[k].alone(others) for k in group]
+        alone = first.alone_of_each(candidates, others)
         if sum(np.isfinite(e.gain) for e in alone) > len(group) / 2:
             gain = self._adapted(kept, others, [own]) - base - alone[0].trial.odds
             if gain > best.gain + _TIE_ODDS:
