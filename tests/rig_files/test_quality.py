@@ -161,6 +161,18 @@ def test_a_plateau_of_the_damper_is_not_clipping(force, noise):
         assert [code for code in codes_of(record) if code == "W_CLIPPED"] == codes, limit
 
 
+@pytest.mark.parametrize("step", [0.0, 150.0])
+@pytest.mark.parametrize("share", [0.94, 0.97])
+def test_a_knee_about_an_offset_force_or_coarse_steps_are_not_clipping(share, step):
+    """A damper that leaks up to its yield force, with a gas force: both ends are flat, at other distances from zero."""
+    time = np.arange(2000) / 500
+    velocity, x = 0.1 * np.cos(2 * np.pi * time), 0.05 / np.pi * np.sin(2 * np.pi * time)
+    force = 9000 * np.clip(velocity, -0.1 * share, 0.1 * share) + 800 * velocity - 150 - 500 * x
+    force += 4 * np.random.default_rng(1).standard_normal(time.size)
+    force = np.round(force / step) * step if step else force
+    assert "W_CLIPPED" not in codes_of(Record("knee", time, x, force))
+
+
 def test_freezing_is_noticed():
     """At least 99 %; stretches of 8 to 60 samples anywhere in displacement or force."""
     found = rig.freezing_found(60)
@@ -185,6 +197,17 @@ def test_a_triangle_is_no_sine(good):
         "W_NOT_SINE"
     ]
     assert codes_of(replace(good, displacement=nearly, force=force_of(nearly, good), velocity=None)) == []
+
+
+@pytest.mark.parametrize("frequency", [0.25, 1.5])
+def test_the_harmonics_of_a_triangle_of_few_cycles_are_no_other_motion(frequency):
+    time = np.arange(0, 3.2 / frequency, 0.002)
+    odd = np.arange(1, 16, 2)
+    triangle = 0.01 * np.sin(2 * np.pi * frequency * time[:, None] * odd) @ ((-1.0) ** (odd // 2) / odd**2)
+    record = Record("t", time, triangle, 2000 * np.gradient(triangle, time))
+    assert codes_of(record) == ["W_NOT_SINE"]
+    hum = replace(record, displacement=triangle + 1e-4 * np.sin(2 * np.pi * 23.3 * frequency * time))
+    assert "W_DISTURBED" in codes_of(hum)
 
 
 def force_of(displacement, record):

@@ -102,7 +102,7 @@ def _periodic_velocity(view: View, velocity: Floats) -> Floats:
     if cycles is None:
         return motion.series(time, 1)
     phases = np.arange(POINTS) / POINTS
-    if motion.distortion < SINE_DISTORTION_LIMIT or len(cycles.starts) < 3:
+    if motion.distortion < SINE_DISTORTION_LIMIT or len(cycles.starts) < _FEWEST:
         return cycles.read(motion.series(cycles.starts[0] + phases * cycles.period, 1), time)
     bins = ((time - cycles.starts[0]) / cycles.period % 1.0 * POINTS).astype(int) % POINTS
     mean = np.bincount(bins, velocity, POINTS) / np.maximum(np.bincount(bins, minlength=POINTS), 1)

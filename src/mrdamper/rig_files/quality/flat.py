@@ -43,6 +43,7 @@ _OTHER = {"displacement": "force", "force": "displacement"}
 _DEPTH = 0.006  # of the peak-to-peak value; at four times this depth the width is measured again
 _DEEPEST = 0.02  # of it: deeper, where noise asks for that, the steep sides of hysteresis are no wider either
 _FORCE_WIDER, _WIDER, _WIDER_ONE_SIDED = 1.45, 1.3, 1.47  # times as wide there: a parabola 2, bundled rigs 1.57, 1.34
+_OPPOSITE = 0.03  # sum of the levels at both ends of a range, of the peak-to-peak force
 _ROUND = 1.75  # times as wide: an end that is not cut off
 _LEVEL = 1.25  # times as wide: a plateau on which the force does not depend on velocity
 _SHOULDER = 0.75  # least growth of the width from the depth to twice the depth [phases]: a smaller one is noise
@@ -263,9 +264,13 @@ def cut_off_before_noise(view: View) -> Iterator[Finding]:
     motion, force = cycles.displacement, cycles.force
     speed = np.abs(motion.slope)
     count = len(cycles.starts)
-    ends = ends_of(force, count, view.force_noise)
+    ends = ends_of(force, count, view.force_noise) if _channels(view)["force"].level < _DEEPEST * force.span else ()
     one_sided = any(top.wider > _ROUND for top in ends)
-    yield from _finding("force", force.span, [top for top in ends if _is_cut_off(top, speed, one_sided)])
+    tops = [top for top in ends if _is_cut_off(top, speed, one_sided)]
+    # Both ends of a range are as far from zero; plateaus of a damper are from its offset force.
+    levels = np.array([top.level for top in ends])
+    if one_sided or any(top.wider < _LEVEL for top in tops) or abs(np.sum(levels)) < _OPPOSITE * force.span:
+        yield from _finding("force", force.span, tops)
     ends = ends_of(motion, count, sample_noise(view.steady.displacement))
     limit = _WIDER_ONE_SIDED if any(top.wider > _ROUND for top in ends) else _WIDER
     tops = [top for top in ends if top.wider < limit and _force_goes_on(top, force)]
