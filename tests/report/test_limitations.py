@@ -123,6 +123,18 @@ def test_the_worst_run_tells_its_kind_of_motion_apart_from_its_range():
     assert "5.3 Hz, 1.7 mm; combination outside the range of the other tests)" in text  # it is a test itself
 
 
+@pytest.mark.parametrize(("error", "flags"), [(0.11, ()), (0.11, ("amplitude",)), (0.05, ())])
+def test_a_run_that_is_predicted_several_times_worse_than_its_peers_is_a_finding(error, flags):
+    def run(name, error, flags=()):
+        return RunScore(name, "rig", Condition(0.5, 2, 0.01), Scores(error, *5 * (0.0,)), None, flags)
+
+    runs = Validation("cross", (*(run(f"t{k}", 0.02) for k in range(5)), run("odd", error, flags)))
+    fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), StopReason.SETTLED, 0.1)
+    texts = texts_of(limitations(replace(scored(fit), cross_validated=runs), ()))
+    found = [s for s in texts if "over 3 times the median of 2.0 %" in s and "11.0 % in odd (0.5 A, 2 Hz, 10 mm)" in s]
+    assert bool(found) == (error > 0.06 and not flags)
+
+
 @pytest.mark.parametrize(
     ("conditions", "said"),
     [

@@ -23,7 +23,7 @@ from mrdamper.identification.loop_analysis import LoopAnalysis
 from mrdamper.physics.motion.sines import MIN_CYCLES
 from mrdamper.study.contradictions import MIN_RUNS
 from mrdamper.study.recipe import RecipeResult
-from mrdamper.study.validation import Validation
+from mrdamper.study.validation import RunScore, Validation
 
 PREDICTION, TESTS, MODEL, PARAMETERS, RANGE = "Prediction", "Tests", "Model", "Parameters", "Range of validity"
 _WORDS = frozenset({"a", "A", "I"})  # parameter names that are also words of a sentence
@@ -41,6 +41,7 @@ _SAME_GAIN, _SAME_OFFSET = (
     0.02,
 )  # differences of the mean of two sessions: of gain, of offset per peak-to-peak force
 _FALLS = 0.9  # ratio of dissipated energies below which the force falls with the current
+_UNLIKE = 3.0  # cross-validated error over the median, from which a run is unlike the others
 _CHANCE = 0.05  # probability of a difference between sessions by chance
 _SAME_MOTION = 0.05  # relative difference of frequencies or amplitudes that are one
 
@@ -208,7 +209,15 @@ def _prediction(cross_validated: Validation, validation: Validation) -> list[str
         if not scores.runs:
             continue
         worst = scores.worst()
-        if worst.scores.nrmse_pp > 2 * scores.median():
+        odd = _unlike_others(scores) if scores is cross_validated else []
+        if odd:
+            values = [f"{100 * run.scores.nrmse_pp:.1f} % in {run.run_id} ({run.condition})" for run in odd]
+            sentences.append(
+                f"Error of a {name} over {_UNLIKE:g} times the median of {100 * scores.median():.1f} %, inside the "
+                f"range of the other tests: {listed(values, _MAX_RUNS)}; check its current, mounting (backlash), "
+                "filters and delays of its channels, and temperature, or repeat the test."
+            )
+        if worst not in odd and worst.scores.nrmse_pp > 2 * scores.median():
             flags = [flag for flag in worst.extrapolation if flag != NOT_A_SINE]
             outside = ", not a sine" if NOT_A_SINE in worst.extrapolation else ""
             tests = "the tested range" if scores is validation else "the range of the other tests"
@@ -226,6 +235,13 @@ def _prediction(cross_validated: Validation, validation: Validation) -> list[str
     if not validation.runs:
         sentences.append("No validation runs: the errors stated are those of cross-validation.")
     return sentences
+
+
+def _unlike_others(scores: Validation) -> list[RunScore]:
+    """Return the runs inside the range of the others whose error is several times the median, the worst first."""
+    inside = [run for run in scores.runs if {*run.extrapolation} <= {NOT_A_SINE}]
+    odd = [run for run in inside if run.scores.nrmse_pp > _UNLIKE * scores.median()]
+    return sorted(odd, key=lambda run: -run.scores.nrmse_pp)
 
 
 def _functions(fit: ModifiedFit, damper: Damper) -> list[str]:
