@@ -226,8 +226,10 @@ def force_channel(view: View) -> Iterator[Finding]:
         yield Finding(
             "W_LAG",
             f"{100 * share:.2g} % of the force acts as a spring of negative stiffness, for which {number(mass, 3)} "
-            f"kg would have to move with the rod: the force is early by about {100 * share / (2 * np.pi):.2g} % of "
-            "the period or more, or the displacement late (filter, or a high-pass in the force)",
+            "kg would have to move with the rod: an inertia (of the fluid, or of a part before the load cell) if tests "
+            "of other frequencies show a similar mass; else the force is early by about "
+            f"{100 * share / (2 * np.pi):.2g} % of the period or more, or the displacement late (filter, or a "
+            "high-pass in the force)",
         )
 
 
