@@ -221,7 +221,7 @@ def _repeated(run: Run, current: float) -> str:
         remedy += f" (or with scale = {_scale_read(run, 'current') * factor:.3g}: one current does not show which)"
     if round(decades) != 0 and abs(decades - round(decades)) < _DECADE:
         remedy = _corrected(run, "current", 10.0 ** round(decades))
-    return f"correct a current that the file name states, and {remedy}, or repeat the test"
+    return f"{remedy} (and correct the name of the file if it states a current), or repeat the test"
 
 
 def _is_stated(run: Run) -> bool:
