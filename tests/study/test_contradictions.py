@@ -18,7 +18,7 @@ from mrdamper.rig_files.rig_import import import_files, to_dataset
 from mrdamper.study.check import check
 from mrdamper.study.contradictions import ContradictionError, compare_runs
 from mrdamper.study.contradictions.evidence import AssumedScatter, Evidence
-from mrdamper.study.contradictions.explanations import Explanation, Trial, completed_matrix_odds
+from mrdamper.study.contradictions.explanations import Explanation, Trial, completed_matrix_odds, unproven_currents
 from mrdamper.study.contradictions.findings import describe
 from mrdamper.study.contradictions.gains import gain_differences
 from mrdamper.study.contradictions.repeats import unequal_repeats
@@ -500,9 +500,19 @@ def past_a_bypass(leak, viscous=1700.0):
     return runs
 
 
-def test_a_bypass_that_carries_the_slow_motions_accuses_no_run():
+@pytest.mark.parametrize("resistance", [3e4, 7e3])
+def test_a_bypass_that_carries_the_slow_motions_accuses_no_run(resistance):
     """Slow loops of a linear bypass have no yield displacement, which a leak describes."""
-    assert find_contradictions(past_a_bypass(lambda force: force / 3e4)) == []
+    assert find_contradictions(past_a_bypass(lambda force: force / resistance)) == []
+
+
+def test_a_current_is_not_contradicted_where_the_force_does_not_depend_on_it(sound):
+    """A run at a current as far from the stated as from the apparent one shows that the force is limited."""
+    track = tracks_of(sound)[0]
+    for force, unproven in ((1.0, {1}), (0.7, set())):
+        tests = ((0.0, 0.5), (0.5, 1.0), (1.0, force), (1.5, 1.0))
+        tracks = [replace(track, current=0 * track.current + i, half_range=100 * half) for i, half in tests]
+        assert unproven_currents(tracks, {1: 1.5}) == unproven
 
 
 @pytest.mark.slow

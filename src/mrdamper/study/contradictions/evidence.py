@@ -26,7 +26,7 @@ from mrdamper.study.contradictions.tracks import Track
 
 _YIELDS = (0.015, 0.06, 0.2, 0.6)  # yield displacements of the stop operators, relative to the median amplitude
 # Yield displacements of stop operators that leak, and velocities from which they yield: a bypass over a compliance.
-_LEAKY = tuple(product((0.06, 0.2), (0.3, 1.0)))
+_LEAKY = (*product((0.06, 0.2), (0.3, 1.0)), (0.06, 2.5))
 _VELOCITIES = (0.03, 0.1, 0.3)  # velocities at which friction saturates, relative to the median peak velocity
 _LEADS = (0.1, 0.4)  # displacements that count as velocity in friction, relative to the median amplitude
 S = TypeVar("S")

@@ -282,8 +282,8 @@ def unproven_currents(tracks: Sequence[Track], apparent: Mapping[int, float]) ->
     """Find runs, by position, that look like another current [A] because the model fails at their motion.
 
     Runs at the motion show it. Either one at the apparent current has another force; or a bypass or a compliance limits
-    the force: the run has the largest force there, as has one whose current is nearer to the stated than to the
-    apparent one. If the force is limited anywhere, runs that have the largest force of their motion are no evidence for
+    the force: the run has the largest force there, as has one whose current is no nearer to the apparent than to the
+    stated one. If the force is limited anywhere, runs that have the largest force of their motion are no evidence for
     a lower current, nor are those beside them.
     """
     refuted, largest, limited = set[int](), set[int](), set[int]()
@@ -297,7 +297,8 @@ def unproven_currents(tracks: Sequence[Track], apparent: Mapping[int, float]) ->
         ):
             refuted.add(k)
         if others and max(ratio for *_, ratio in others) <= _SAME_FORCE:
-            if any(abs(at - stated) < abs(at - current) and _alike(ratio, _SAME_FORCE) for _, at, ratio in others):
+            alike = [at for _, at, ratio in others if _alike(ratio, _SAME_FORCE)]
+            if any(abs(at - stated) <= abs(at - current) + SAME_CURRENT for at in alike):
                 limited.add(k)
             if current < stated:
                 largest.add(k)

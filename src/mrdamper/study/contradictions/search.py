@@ -134,6 +134,10 @@ class Search:
                 self.found[i] = best
                 self.unproven.discard(i)
         self._review()
+        # Runs whose explanation was dropped are evidence against that of others.
+        unproven = unproven_currents(tracks, _apparent_currents(self.found))
+        self.unproven |= unproven
+        self.found = {k: explanation for k, explanation in self.found.items() if k not in unproven}
 
     def _explain_until_agreement(self, most: int) -> None:
         while len(self.found) <= most:
@@ -230,8 +234,7 @@ class Search:
 
         for _ in range(2):
             choose({"saturation": saturation, "bend": bend} for saturation, bend in product(_SATURATIONS, _BENDS))
-            choose({"misfit": misfit} for misfit in _MISFITS)
-            choose({"leak": leak} for leak in (0.0, 1.0))
+            choose({"misfit": misfit, "leak": leak} for misfit, leak in product(_MISFITS, (0.0, 1.0)))
         choose({"gain": gain, "offset": offset} for gain, offset in _GAINS)
         self.evidence.spread = max(scores, key=scores.__getitem__)
         expected = self.evidence.posterior(expected.weigh([self._products[k] for k in agreeing]))
