@@ -1869,6 +1869,14 @@ def test_two_versions_of_a_plan_are_not_taken_for_one(tmp_path, older, refused):
     assert {refusal.error.code for refusal in result.refusals} <= {"E_CURRENT_CONTRADICTS"}
     told = [finding.text for record in result.records for finding in record.findings]
     assert any("plan_v2.csv" in text and "gives 0.5 A, run_2 has 0.45 A" in text for text in told) == (not refused)
+    table = {r.id: (r.doubt is None, r.current is not None) for r in found_tests([tmp_path])[0]}
+    agreed = {f"run_{n}" for n, (a, b) in enumerate(zip(older, newer, strict=True), 1) if a == b}
+    assert {run for run, (sure, current) in table.items() if sure and current} == agreed
+    cells = "".join(f"run_{n}.csv,{of}\n" for n, of in enumerate((older[0], *newer[1:]), 1))
+    (tmp_path / "tests.csv").write_text(f"file,current_A\n{cells}")
+    decided = [finding.text for record in import_files([tmp_path]).records for finding in record.findings]
+    assert any("tests.csv decides: plan_v1.csv, Current (A) gives" in text for text in decided)
+    assert any("tests.csv decides: plan_v2.csv, Current (A) gives" in text for text in decided) == bool(refused)
 
 
 def test_counts_of_a_converter_are_asked_for_their_scale_and_offset(tmp_path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -92,7 +93,8 @@ def finding_lines(findings: Iterable[tuple[str, Finding]], verbose: bool) -> lis
     """List the findings of tests, those of one code once with the number of its tests unless all are asked for."""
     alike: dict[str, list[tuple[str, Finding]]] = {}
     for name, finding in findings:
-        told_apart = f"{finding}" if finding.code == "W_SCALE" else finding.code  # of every column
+        text = f"{finding}" if finding.code in ("W_SCALE", "W_CHOSEN") else finding.code  # of every column and plan
+        told_apart = re.sub("[0-9]+([.,][0-9]+)*", "#", text) if finding.code == "W_CHOSEN" else text
         alike.setdefault(f"{name}: {finding}" if verbose else told_apart, []).append((name, finding))
     counts = [len({name for name, _ in group}) for group in alike.values()]
     return [

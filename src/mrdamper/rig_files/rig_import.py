@@ -186,6 +186,9 @@ class _Intake:
         self._pending: list[tuple[Path, Record]] = []
         self._found: list[tuple[Path, Record]] = []
         self.unchecked: list[tuple[Path, Record]] = []  # every test, also those refused
+        self.disputed: dict[
+            tuple[Path, str], InputError
+        ] = {}  # by file and test: two statements of its current, or a remark
         self.refusals: list[Refusal] = []
         self.notes: list[Refusal] = []  # texts of a folder that hold no table
         self.omitted: dict[Path, str] = {}  # tests that the profile leaves out, files of those that repeat another: why
@@ -378,17 +381,20 @@ class _Intake:
         if other is not None:
             refused = dict.fromkeys(range(len(own)), other) if own[0][0] == path else {}
         answers += ["profile"] if other else []
-        near = dict[int, ColumnError]()
+        near = dict[int, InputError]()
         for i, ((file, record), (current, whence)) in enumerate(zip(own, stated or (), strict=False)):
-            if (error := coil_current.other_statement(record, current, whence, file.name)) is not None:
-                near[i] = error
+            differs: InputError | None = coil_current.other_statement(record, current, whence, file.name)
+            far = False
             try:
                 coil_current.with_stated_current(record, current, whence, file.name)
             except InputError as error:
-                refused |= self._unanswered({i: (file, record)}, {i: error}, answers)
-        if contradicted := [i for i, error in refused.items() if error.code == "E_CURRENT_CONTRADICTS"]:
+                differs, far = error, True
+            unanswered = self._unanswered({i: (file, record)}, {i: differs}, answers) if differs else {}
+            near |= unanswered
+            refused |= unanswered if far else {}
+        if any(error.code == "E_CURRENT_CONTRADICTS" for error in refused.values()):
             refused = near | refused  # a plan of another version
-        for i in {*near} - {*contradicted}:
+        for i in {*near} - {*refused}:
             text = f"of two statements the first is taken: {near[i].found}"
             self._exchange(own[i][1], own[i][1].noticed(Finding("W_CHOSEN", text)))
         self._refuse({tests[i][0]: error for i, error in refused.items()})
@@ -410,8 +416,7 @@ class _Intake:
                 self._exchange(record, record.noticed(Finding("W_CHOSEN", f"{answer} decides: {error.found}")))
                 continue
             unanswered[i] = error
-            doubtful = replace(record, doubt=error)
-            self.unchecked = [(p, doubtful if (p, r.id) == (file, record.id) else r) for p, r in self.unchecked]
+            self.disputed[file, record.id] = error
         return unanswered
 
     def _exchange(self, record: Record, other: Record) -> None:
@@ -597,6 +602,7 @@ def found_tests(
         intake.join([path for path in others if path.suffix.lower() in SHORT_TEXTS])
         refusals = [refusal for refusal in intake.refusals if not refusal.run]
         tests = intake.in_order(intake.unchecked)
+        tests = [(path, replace(r, doubt=intake.disputed.get((path, r.id), r.doubt))) for path, r in tests]
     return tuple(_with_folders(tests)), tuple(refusals)
 
 

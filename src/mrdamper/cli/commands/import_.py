@@ -116,6 +116,7 @@ def _write_tests(files: list[Path], settings: Profile, target: Path) -> None:
     warn(f"not in the table: {line}" for line in _refused_lines(refusals))
     if not records:
         raise InputError("no test can be read", remedy="correct the files listed above, or give a profile")
+    warn(f"current_A of {record.id} left empty: {record.doubt.found}" for record in records if record.doubt)
     put_text(tests_text(records), target)
     if str(target) != "-":
         print(f"table of {counted(len(records), 'test')}: {target}; complete it, then import with it")
