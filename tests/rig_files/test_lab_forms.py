@@ -1903,3 +1903,29 @@ def test_a_plan_in_a_workbook_may_merge_cells_or_repeat_by_ditto_marks(tmp_path,
             sheet.merge_cells(cells)
     book.save(tmp_path / "log sheet.xlsx")
     assert by_id(import_files([tmp_path])) == {"B-01": 0.25, "B-02": 0.25, "B-03": 0.5, "B-04": 0.5}
+
+
+@pytest.mark.parametrize("nodes", ["ns=4;s=Rig.Stroke,ns=4;s=Rig.Load", "ns=2;i=1042,ns=2;i=1043", "Stroke,Load"])
+@pytest.mark.parametrize("late", [0.0, 2e-4])
+def test_nodes_of_a_server_are_channels_with_the_units_of_a_list_or_of_a_profile(nodes, late, tmp_path):
+    names = [node.strip() for node in nodes.split(",")]
+    body = "".join(
+        f'{t + late * n:.4f},"{node}",{value:.5f},Good\n'
+        for t, x, f in zip(T, X, force(0.5), strict=True)
+        for n, (node, value) in enumerate(zip(names, (x, f / 1e3), strict=True))
+    )
+    (tmp_path / "a_0.5A.csv").write_text(f"SourceTime_s,NodeId,Value,StatusCode\n{body}")
+    (tmp_path / "tags.csv").write_text(
+        f'NodeId,DisplayName,Units\n"{names[0]}",stroke of the rod,mm\n"{names[1]}",load cell,kN\n'
+    )
+    stated = "".join(
+        f'[channels.{role}]\ncolumn = "{name}"\nunit = "{unit}"\n'
+        for role, name, unit in zip(("displacement", "force"), names, ("mm", "kN"), strict=True)
+    )
+    for profile in ("", stated):
+        (record,) = import_files([tmp_path], parse_profile(profile)).records
+        np.testing.assert_allclose(record.force, force(0.5)[: record.force.size], atol=0.01)
+        (tmp_path / "tags.csv").unlink(missing_ok=True)
+    problems = " ".join(str(refusal.error) for refusal in import_files([tmp_path]).refusals)
+    assert problems
+    assert "SourceTime_s' and differ" not in problems

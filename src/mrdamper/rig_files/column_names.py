@@ -155,6 +155,7 @@ _LONGEST_NAME = 200  # beyond, it is no name, and matching it could take long
 # Time  1 - default sample rate
 _RATE_GROUP = re.compile(r"\s+\d*\s*-\s*(?:default|fast|slow) sample rate", re.IGNORECASE)
 _DEVICE = re.compile(r"\\[\w.-]{1,30}:[0-9]{1,3}$")  # F_rod\ES650:1
+_NODE = re.compile(r'(?<![^\s",;|])nsu?=[^;,"]{1,80};([isgb])=')  # of OPC UA, before the name of a node: ns=4;s=
 _NUMBER = re.compile("(?<![0-9])(?:0|[1-9][0-9]*)$")
 _FUSED = re.compile(r"[ _.:-]+")
 _AROUND_UNITS = words("around_units")
@@ -204,7 +205,7 @@ def split_name(header: str, unit: str = "") -> Header:
     """Name and unit of a column whose header may hold both: `force_N`, `Force [kN]`, `Kraft in kN`."""
     if len(header) > _LONGEST_NAME:
         return Header(header, unit)
-    text = _DEVICE.sub("", unicodedata.normalize("NFKC", header).translate(_INVISIBLE).strip())
+    text = _DEVICE.sub("", unicodedata.normalize("NFKC", without_namespaces(header)).translate(_INVISIBLE).strip())
     if unit:
         match = _BRACKETED.match(text)
         return Header(match["name"] if match and (parse_unit(match["unit"]) or ":" in match["unit"]) else text, unit)
@@ -226,6 +227,11 @@ def split_name(header: str, unit: str = "") -> Header:
     match = _BRACKETED.match(text)
     own = parse_unit(text) if len(text) > 3 and is_unit(text) else None  # Amps, Newtons
     return Header(match["name"].strip() or text if match else text, text if own and own.dimension in _BY_UNIT else "")
+
+
+def without_namespaces(text: str) -> str:
+    """Return a text with the nodes of OPC UA by their names: Rig.Load of ns=4;s=Rig.Load, node 1042 of ns=2;i=1042."""
+    return _NODE.sub(lambda match: "node " * (match[1] == "i"), text)
 
 
 def headers_of(names: Sequence[str], units: Sequence[str]) -> tuple[Header, ...]:

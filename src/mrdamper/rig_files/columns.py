@@ -64,9 +64,11 @@ def assign(table: RawTable, profile: Profile) -> dict[str, Assigned]:
         problems += _missing(table, columns, profile)
     assigned: dict[str, Assigned] = {}
     stated = profile.current or currents_in(table.source.name)
+    missing = bool(problems)  # then times of one name may be those of a channel each
     for role, column in columns.items():
         with _noted(problems):
-            _refuse_two_values(table, role, column, profile)
+            if role != "time" or not missing:
+                _refuse_two_values(table, role, column, profile)
             entry = _convert(table, role, column, profile, asks_current=bool(problems) and not stated)
             assigned |= {} if entry is None else {role: entry}
     if not problems and "time" in assigned and "time" not in profile.channels:

@@ -126,9 +126,9 @@ def test_tables(tables: list[RawTable], profile: Profile) -> list[RawTable]:
         raise tables[0].source.refuse("E_NO_DATA", "every table is left out", "correct [file] leave_out of the profile")
     tables = [t for t, out in zip(tables, omitted, strict=True) if not out or t.label.startswith("block")]  # numbered
     tables = with_joined_rasters([with_time_stated(completed(with_channels_as_columns(table))) for table in tables])
-    tables = [with_one_clock(with_sums(table, profile)) for table in tables]
-    forms = [form_of_tests(table, profile.file) for table in tables]
     stated = {name: channel.column for name, channel in profile.channels.items() if channel.column is not None}
+    tables = [with_one_clock(with_sums(table, profile), stated) for table in tables]
+    forms = [form_of_tests(table, profile.file) for table in tables]
     parts = [part for t, form in zip(tables, forms, strict=True) for part in tests_of(t, form, stated)]
     timed = [with_integrated_velocity(with_unit_of_time(table)) for table in with_results(parts)]
     return [with_channels_by_physics(table, stated) for table in timed]

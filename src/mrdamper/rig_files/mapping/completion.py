@@ -382,7 +382,8 @@ def _with_listed_units(table: RawTable) -> RawTable:
     """Units that lines above the columns state: Weg in mm, Kraft in N; X-Unit: ms; a channel and its unit in cells."""
     bare = [i for i, header in enumerate(table.headers) if header.name and not header.unit]
     names = {i: name for i, name in enumerate((*table.names, *table.constants)) if i in bare or i >= len(table.names)}
-    wanted, times = {name.strip().casefold(): i for i, name in names.items()}, table.columns("time")
+    wanted, times = {table.headers[i].name.casefold(): i for i in bare}, table.columns("time")
+    wanted |= {name.strip().casefold(): i for i, name in names.items()}
     wanted |= {name.strip(): i for i, name in names.items()}  # t is no T
     behind: dict[int, set[str]] = {}
     listed: dict[int, set[str]] = {}

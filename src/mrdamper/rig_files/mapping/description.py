@@ -98,7 +98,8 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     texts = texts + (structures if lacking or len(structures) <= _FEW_FILES else [])
     texts = texts + [p for p in listing if lacking and p.stat().st_size <= _LARGEST_LIST]
     texts = [p for p in {*texts} if p.is_file() and p != path and not profile.leaves_out(*p.parts)]
-    lines = [line for text in sorted(texts) if len(own := short_lines(text)) <= _MOST for line in own]
+    own = (short_lines(text) for text in sorted(texts))
+    lines = [column_names.without_namespaces(line) for of in own if len(of) <= _MOST for line in of]
     names = {header.name.casefold() for header in table.headers}
     counts, of_file = partial(scales.counts_in, names=names), partial(said_of_file, name=path.name)
     alike = [h.name for h in table.headers if h.role in SIGNED and len(table.columns(h.role)) > 1]

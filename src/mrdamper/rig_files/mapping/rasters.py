@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache, lru_cache
+from types import MappingProxyType
 
 import numpy as np
 
@@ -20,8 +21,10 @@ _SAME = 1e-9  # [s]: clocks that differ by less are one
 _TWO_STARTS = 1.0  # [s] between two clocks of all channels: more is a clock with another zero, as the time of day
 
 
-def with_one_clock(table: RawTable) -> RawTable:
+def with_one_clock(table: RawTable, stated: Mapping[str, str | int] = MappingProxyType({})) -> RawTable:
     """Return the table with every channel on the force's clock, where groups of columns have times of their own.
+
+    The profile may state the columns of channels, by name or number.
 
     Raises `RigFileError`: E_RASTER, when the table is read, if a channel covers less than half of the force's time.
     """
@@ -29,7 +32,12 @@ def with_one_clock(table: RawTable) -> RawTable:
     if len(groups) < 2:
         return _with_clocks_compared(table)
     owner = {column: clock for clock, columns in groups.items() for column in columns}
-    roles = {role: [i for i in owner if table.headers[i].channel == role] for role in (*REQUIRED[1:], *OPTIONAL)}
+    called = {i: (table.names[i], table.headers[i].name, table.number(i)) for i in owner}
+    roles = {
+        role: [i for i in owner if stated.get(role) in called[i]]
+        or [i for i in owner if table.headers[i].channel == role]
+        for role in (*REQUIRED[1:], *OPTIONAL)
+    }
     if not roles["force"] or not roles["displacement"]:
         return table
     together = [c for c in groups if all(any(owner[i] == c for i in roles[r]) for r in ("displacement", "force"))]
@@ -37,7 +45,7 @@ def with_one_clock(table: RawTable) -> RawTable:
         return table  # groups that are tests
     clock = together[0] if together else owner[roles["force"][0]]
     kept = [clock, *(i for i in owner if owner[i] == clock), *(i for i in owner if owner[i] != clock)]
-    return _resampled(table, clock, kept, owner)
+    return _resampled(table, clock, kept, owner, roles)
 
 
 def with_joined_rasters(tables: list[RawTable]) -> list[RawTable]:
@@ -132,7 +140,9 @@ def _by_length(table: RawTable, groups: dict[int, list[int]]) -> dict[int, list[
     return {clock: [i for i in channels if sizes[i] == sizes[clock]] for clock in groups}
 
 
-def _resampled(table: RawTable, clock: int, kept: Sequence[int], owner: dict[int, int]) -> RawTable:
+def _resampled(
+    table: RawTable, clock: int, kept: Sequence[int], owner: Mapping[int, int], roles: Mapping[str, Sequence[int]]
+) -> RawTable:
     read = lru_cache(maxsize=4)(lambda column: table.read([column]).values[column])
 
     def stamps(column: int) -> Floats:
@@ -142,8 +152,7 @@ def _resampled(table: RawTable, clock: int, kept: Sequence[int], owner: dict[int
     def common() -> tuple[slice, Floats]:
         """Rows of the force that lie within the displacement's time, if most do, and their times."""
         target = _filled(stamps(clock))
-        moved = next((i for i in owner if table.headers[i].channel == "displacement"), clock)
-        other = _filled(stamps(owner.get(moved, moved)))
+        other = _filled(stamps(owner[roles["displacement"][0]]))
         inside = np.flatnonzero(_covered(target, other[np.isfinite(other)]))
         rows = slice(inside[0], inside[-1] + 1) if inside.size >= _FEWEST_OVERLAP * target.size else slice(target.size)
         return rows, target[rows]
@@ -160,7 +169,7 @@ def _resampled(table: RawTable, clock: int, kept: Sequence[int], owner: dict[int
 
     gaps = _apart(table, clock, [*{*owner.values()} - {clock}])
     apart = {other: gap for other, gap in gaps.items() if gap > _SAME}
-    names = sorted({table.headers[i].name for i in kept if owner.get(i) in apart and table.headers[i].channel})
+    names = sorted({table.headers[i].name for own in roles.values() for i in own if owner[i] in apart})
     own, text = "on clocks of their own", f"interpolated onto the force's: {', '.join(names[:6])}"
     if max(apart.values(), default=np.inf) < np.inf:
         own += f", up to {number(1e3 * max(apart.values()))} ms apart"
