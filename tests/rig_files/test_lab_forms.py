@@ -1929,3 +1929,18 @@ def test_nodes_of_a_server_are_channels_with_the_units_of_a_list_or_of_a_profile
     problems = " ".join(str(refusal.error) for refusal in import_files([tmp_path]).refusals)
     assert problems
     assert "SourceTime_s' and differ" not in problems
+
+
+@pytest.mark.parametrize("form", ["I = {} A", "I={} A, 1 Hz", "{} A"])
+@pytest.mark.parametrize("long", [True, False])
+@pytest.mark.parametrize("folder", ["data", "I0.75A"])
+def test_a_column_of_conditions_states_the_current_of_each_trial_and_not_the_folder(form, long, folder, tmp_path):
+    lines = ["trial,condition,time_s,signal,value,unit" if long else "trial,condition,time_s,displacement_mm,force_N"]
+    for trial, current in enumerate((0.25, 0.5), 1):
+        for t, x, f in zip(T, X, force(current, trial), strict=True):
+            start = f'{trial},"{form.format(current)}",{t:.4f}'
+            cells = (f"displacement,{x:.5f},mm", f"force,{f:.4f},N") if long else (f"{x:.5f},{f:.4f}",)
+            lines += [f"{start},{cell}" for cell in cells]
+    (tmp_path / folder).mkdir()
+    (tmp_path / folder / "session.csv").write_text("\n".join([*lines, ""]))
+    assert by_id(import_files([tmp_path / folder])) == {"session_1": 0.25, "session_2": 0.5}

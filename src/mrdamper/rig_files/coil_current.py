@@ -36,6 +36,7 @@ _CHANNEL_WRONG = (
 _OF_ANOTHER = re.compile("(?i)shunt|bridge|brücke")  # resistance or voltage
 _LARGEST_MARKED, _MOST_MARKS = 64 * 2**20, 500  # bytes of a file in whose rows marks are looked for, and marks
 _FOLDERS = 3  # above a file, whose names may state its current
+_FOLDER = "the folder "  # beginning of where it stands there
 
 
 def current_of(
@@ -325,10 +326,12 @@ def _set_points(table: RawTable, rows: slice) -> list[Statement]:
 
 
 def with_marks(records: Sequence[Record], table: RawTable, tests: Sequence[slice]) -> Sequence[Record]:
-    """Return records without a current with that of a column of marks of events, where the rows of each have one."""
+    """Return records with the currents of a column of marks, where each has one, and none but its folder's so far."""
     bare = [i for i, header in enumerate(table.headers) if header.role is None and not header.unit]
     searched = table.words is not None and table.source.size <= _LARGEST_MARKED
-    for column in bare if searched and all(r.current is None and not r.doubt for r in records) else ():
+    of_folder = [r.provenance.get("current_from", "").startswith(_FOLDER) for r in records]
+    bare_records = [replace(r, current=None) if own else r for r, own in zip(records, of_folder, strict=True)]
+    for column in bare if searched and all(r.current is None and not r.doubt for r in bare_records) else ():
         words = table.words(column)  # type: ignore[misc]
         labels = ["" if RATING.search(label) else label for label in words.labels[: _MOST_MARKS + 1]]
         stated = [of[0] if len(of := currents_in(label)) == 1 else None for label in labels]
@@ -337,7 +340,7 @@ def with_marks(records: Sequence[Record], table: RawTable, tests: Sequence[slice
         codes = [[code for code in np.unique(words.codes[rows]) if stated[code] is not None] for rows in tests]
         if all(len(own) == 1 for own in codes):
             marks = [(stated[own[0]] or 0.0, f"the mark {labels[own[0]]!r}") for own in codes]
-            return [with_stated_current(r, *mark, r.id) for r, mark in zip(records, marks, strict=True)]
+            return [with_stated_current(r, *mark, r.id) for r, mark in zip(bare_records, marks, strict=True)]
     return records
 
 
@@ -347,7 +350,7 @@ def _folders(table: RawTable, path: Path) -> list[Statement]:
     for name in (*reversed(inner), *(folder.name for folder in list(path.parents)[:_FOLDERS])):
         stated = currents_in(name) or tuple(s.amperes for s in stated_by_lines([name]))
         if stated:
-            return [Statement(stated[0], f"the folder {name!r}")] if len(stated) == 1 else []
+            return [Statement(stated[0], f"{_FOLDER}{name!r}")] if len(stated) == 1 else []
     return []
 
 

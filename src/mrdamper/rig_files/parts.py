@@ -97,7 +97,8 @@ def _changes_with_time(table: RawTable, column: int) -> bool:
 
 def _by_run(table: RawTable, column: int, *, stated: bool) -> list[RawTable]:
     assert table.words is not None
-    words = table.words(column)
+    table = replace(table, words=cache(table.words))  # every test asks
+    words = table.words(column)  # type: ignore[misc]
     codes, labels = words.codes, list(words.labels)
     merged = "" in labels and labels[0] != ""  # named in its first row only
     if merged:
@@ -159,10 +160,16 @@ def _part(
             own[:] = own if np.isfinite(own[1:]).any() else own[0]
         return Content(values, None if content.lines is None else content.lines[inside], content.findings)
 
+    def words(column: int) -> Words:
+        assert table.words is not None
+        whole = table.words(columns[column])
+        codes, places = np.unique(whole.codes[rows()], return_inverse=True)
+        return Words(places, tuple(whole.labels[code] for code in codes))
+
     cells = {line: _title_cells(line) for line in table.remarks}
     several = tuple(line for line, own in cells.items() if len({value for c in own for value in currents_in(c)}) > 1)
     name = "_".join(part for part in (table.label, label) if part)
-    return replace(table.picked(columns, part), titles=several, label=name)
+    return replace(table.picked(columns, part), titles=several, label=name, words=words if table.words else None)
 
 
 def _title_cells(line: str) -> list[str]:
