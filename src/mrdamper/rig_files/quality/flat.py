@@ -161,11 +161,11 @@ class _Channel:
 
     @cached_property
     def level(self) -> float:
-        """Step of which the channel's values are multiples; zero where they are none."""
+        """Step of which the values are multiples, also where decimals round them; zero where there is none."""
         present = self.values[np.isfinite(self.values)][:100_000]
         gaps = np.diff(np.unique(present)[1:-1])  # a clipped end need not lie on the grid
         gaps = gaps[gaps > 1e-7 * np.ptp(present)] if present.size else gaps  # less is rounding
-        step = float(np.min(gaps, initial=np.inf))
+        step = float(np.mean(gaps[gaps < 1.5 * np.min(gaps)])) if gaps.size else np.inf
         # Where there is no step, the counts are as far from whole numbers as chance has it: 0.25.
         return step if gaps.size and np.mean(np.abs(gaps / step - np.round(gaps / step))) < 0.1 else 0.0
 
