@@ -451,6 +451,11 @@ def _refuse_factor(table: RawTable, role: str, unit: str) -> None:
             raise _refusal(ColumnError, table, problem, remedy, "E_AMBIGUOUS")
 
 
+def _holds_whole_numbers(table: RawTable, column: int) -> bool:
+    values = table.try_read(column)
+    return values is not None and np.array_equal(values[column], np.round(values[column]), equal_nan=True)
+
+
 def _unit_problem(table: RawTable, role: str, column: int, unit: str) -> UnitError | None:
     parsed = parse_unit(unit)
     named = f"column {table.names[column] or table.number(column)!r}"
@@ -462,7 +467,7 @@ def _unit_problem(table: RawTable, role: str, column: int, unit: str) -> UnitErr
         unit = unit or column_names.unknown_unit(table.names[column])
         problem = f"{named} has no unit" if not unit else f"{named} has the unit {unit!r}, which is not known"
         remedy = f'write it into the header, or set [channels.{role}] unit = "..." in a profile'
-        if _CONVERTER.search(table.names[column]):
+        if _CONVERTER.search(table.names[column]) or (role != "time" and _holds_whole_numbers(table, column)):
             remedy += ", with scale = ... (unit per count) and offset = ... (value at zero counts) of a converter"
         return _refusal(UnitError, table, problem, remedy, "E_UNITS_MISSING")
     if parsed.dimension == DIMENSION[role]:

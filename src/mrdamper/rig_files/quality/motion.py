@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -175,6 +176,13 @@ class Size(NamedTuple):
     remedy: str
 
 
+def _other_unit(view: View, role: str, unit: str = "") -> str:
+    """Return the remedy for a channel that is too large: its unit or, where it has the smaller one, a scale."""
+    if unit and re.search(rf"(?:^|, ){role} = .*? in {unit}(?:, |$)", view.record.provenance.get("columns", "")):
+        return f"if these are counts, set their scale in a profile, in {unit} per count: [channels.{role}] scale"
+    return f"set its unit in a profile: [channels.{role}] unit" + (f' = "{unit}"?' if unit else "")
+
+
 def _sizes(view: View) -> tuple[Size, ...]:
     record, strokes = view.record, view.strokes
     stroke, force = (float(np.nanmax(values) - np.nanmin(values)) for values in (record.displacement, record.force))
@@ -183,18 +191,17 @@ def _sizes(view: View) -> tuple[Size, ...]:
         for values in (record.force, record.current)
     )
     speed = float(np.median(strokes.lengths / strokes.durations)) if strokes.durations.size else 0.0
-    unit = "set its unit in a profile: [channels.{}] unit{}"
     length = f"displacement moves {f'{number(stroke)} m' if stroke > 0.9 else f'{1e3 * stroke:.3g} mm'} peak to peak"
-    remedy = unit.format("displacement", ' = "mm"?')
+    remedy = _other_unit(view, "displacement", "mm")
     if force < 3.0 < stroke:
         length += f", force {number(force)} N"
         remedy = "displacement and force look exchanged: name the columns the other way round"
     check = "check the load cell, the unit of force (kN?), or whether columns are exchanged"
     return (  # [m] of test rigs, [N] of seismic test machines, [N] that load cells resolve, [A], [m/s] and [s]
         Size(length, stroke, (0.0, 3.0), (0.15e-3, 0.9), remedy),
-        Size(f"force reaches {number(largest)} N", largest, (0.0, 2e7), _ANY, unit.format("force", "")),
+        Size(f"force reaches {number(largest)} N", largest, (0.0, 2e7), _ANY, _other_unit(view, "force")),
         Size(f"force changes by {number(force, 3)} N in the whole record", force, (0.5, np.inf), (8.0, 1.5e6), check),
-        Size(f"current reaches {current:.4g} A", current, (0.0, 200.0), _ANY, unit.format("current", ' = "mA"?')),
+        Size(f"current reaches {current:.4g} A", current, (0.0, 200.0), _ANY, _other_unit(view, "current", "mA")),
         Size(f"the mean speed of the strokes is {number(speed)} m/s", speed, (0.0, 30.0), _ANY,
              "check the units of time and displacement"),
         Size(f"a cycle takes {number(strokes.period or 0, 3)} s", strokes.period or 0.0, _ANY, (0.0, 300.0), ""),
