@@ -170,10 +170,11 @@ def import_files(
         named = tuple(replace(refusal, file=without_temporary_folder(refusal.file)) for refusal in refusals)
         left_out += [] if refusals is intake.notes else dict.fromkeys(Path(note.file) for note in intake.notes)
         left_out += intake.omitted
-        names = tuple(path.name for path in left_out)
-        reasons = {path.name: why for path, why in intake.omitted.items() if why}
-        reasons |= {Path(note.file).name: intake.reason(note) for note in intake.notes}
-        return ImportResult(with_unique_ids(_with_folders(intake.tests())), named, names, reasons)
+        names = last_parts(path.parts for path in left_out)
+        why = intake.omitted | {Path(note.file): intake.reason(note) for note in intake.notes}
+        reasons = {names[path.parts]: text for path, text in why.items() if text and path.parts in names}
+        left_out_names = tuple(names[path.parts] for path in left_out)
+        return ImportResult(with_unique_ids(_with_folders(intake.tests())), named, left_out_names, reasons)
 
 
 class _Intake:
