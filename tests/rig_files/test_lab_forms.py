@@ -1232,9 +1232,7 @@ def test_two_currents_in_a_line_over_one_test_are_asked_about(tmp_path, line):
     (tmp_path / "a.csv").write_text(f"{line}\nTime [s],disp [mm],force [N]\n" + rows(T, X, force(0.5)))
     (refusal,) = import_files([tmp_path]).refusals
     assert refusal.error.code == "E_CURRENT_MISSING"
-    assert (
-        'either [channels.current] column = "...", or [current] pattern' in refusal.error.remedy
-    )  # only one may stand
+    assert "set one of these in a profile: [current] value" in refusal.error.remedy  # only one may stand
 
 
 def test_columns_of_one_name_below_their_conditions_are_tests_and_a_number_leaves_none_out_in_silence(tmp_path):
@@ -1879,6 +1877,28 @@ def test_two_versions_of_a_plan_are_not_taken_for_one(tmp_path, older, refused):
     assert any("tests.csv decides: plan_v2.csv, Current (A) gives" in text for text in decided) == bool(refused)
 
 
+def test_a_table_of_cycle_maxima_beside_each_test_is_no_test_and_is_named_with_its_folder(tmp_path):
+    for folder, amperes in (("A_0.25A", 0.25), ("B_0.5A", 0.5)):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "timed.csv").write_text(HEAD + rows(T, X, force(amperes)))
+        head = "Cycle,Displacement Maximum [mm],Displacement Minimum [mm],Force Maximum [N],Force Minimum [N]\n"
+        (tmp_path / folder / "peaks.csv").write_text(head + "".join(f"{n},8.1,-8.0,403,-401\n" for n in range(1, 5)))
+    result = import_files([tmp_path])
+    assert not result.refusals
+    assert [*by_id(result).values()] == [0.25, 0.5]
+    assert sorted(result.left_out) == ["A_0.25A/peaks.csv", "B_0.5A/peaks.csv"]
+
+
+def test_whole_numbers_without_a_unit_are_asked_for_a_scale_also_once_the_unit_is_set(tmp_path):
+    columns = (T, np.round(4000 * X / 10), np.round(8 * force(0.5)))
+    (tmp_path / "a_0.5A.csv").write_text("t_s,stroke,load\n" + rows(*columns))
+    assert all("scale = ..." in refusal.error.remedy for refusal in import_files([tmp_path]).refusals)
+    units = "[channels.displacement]\nunit = 'mm'\n[channels.force]\nunit = 'N'\n"
+    (refusal,) = import_files([tmp_path], parse_profile(units)).refusals
+    assert refusal.error.code == "E_RANGE"
+    assert "in mm per count: [channels.displacement] scale" in refusal.error.remedy
+
+
 def test_counts_of_a_converter_are_asked_for_their_scale_and_offset(tmp_path):
     counts = [np.round(4096 + 200 * X), np.round(4096 + 8 * force(0.5))]
     (tmp_path / "a_0.5A.csv").write_text("t_s,lvdt_adc,load_adc\n" + rows(T, *counts))
@@ -1944,3 +1964,17 @@ def test_a_column_of_conditions_states_the_current_of_each_trial_and_not_the_fol
     (tmp_path / folder).mkdir()
     (tmp_path / folder / "session.csv").write_text("\n".join([*lines, ""]))
     assert by_id(import_files([tmp_path / folder])) == {"session_1": 0.25, "session_2": 0.5}
+
+
+@pytest.mark.parametrize(("start", "samples", "frozen"), [(1.246, 5, False), (1.1, 60, True)])
+def test_readings_in_steps_that_decimals_round_may_repeat_at_a_turning_point(start, samples, frozen, tmp_path):
+    step = 0.00763  # mm
+    noise = np.random.default_rng(1).standard_normal((2, 4000))
+    t = 0.002 * np.arange(4000)
+    stroke = step * np.round(10 * np.sin(2 * np.pi * t) / step + 1.2 * noise[0])
+    first = round(start / 0.002)
+    stroke[first : first + samples] = stroke[first]
+    load = 300 * np.tanh(6 * np.cos(2 * np.pi * t)) + 100 * np.cos(2 * np.pi * t) + noise[1]
+    (tmp_path / "a_0.5A.csv").write_text("t_s,stroke_mm,load_N\n" + rows(t, np.round(stroke, 3), np.round(load, 3)))
+    codes = {finding.code for finding in import_files([tmp_path]).records[0].findings}
+    assert ("W_FROZEN" in codes) == frozen

@@ -159,9 +159,9 @@ def require_current(record: Record, path: Path = Path()) -> Record:
     raise ColumnError(
         "; ".join(reasons[:1] or ["no coil current in a column, or in the name of the file or of its folder", *near]),
         where=Path(record.provenance.get("file", record.id)).name,
-        remedy=f"{first}write the currents into tests.csv (--write-tests), or set one in a profile: either "
-        f'[channels.current] column = "...", or [current] pattern = "*_{{current}}A_*" and unit = "A", or [current] '
-        f"values = {{{value}}}, or, if all tests have one, [current] value = 0.5",
+        remedy=f"{first}write the currents into tests.csv (--write-tests), or set one of these in a profile: [current] "
+        f'value = 0.5 of all tests, values = {{{value}}}, pattern = "*_{{current}}A_*" and unit = "A"; or '
+        '[channels.current] column = "..."',
         code="E_CURRENT_MISSING",
     )
 

@@ -98,6 +98,12 @@ def _from_table(text: str) -> Unit | None:
     return None
 
 
+def shown_unit(text: str) -> str:
+    """Return a unit as it is written where a program has all of its header in capitals: daN of DAN."""
+    capitals = text.isupper() and text not in _UNITS
+    return next((name for name in _UNITS if name.upper() == text), text) if capitals else text
+
+
 def _normal(text: str) -> str:
     """One writing for the many of m/s²: m/s^2, m s-2, m_s2, m/s**2, m·s⁻²."""
     text = " ".join(text.translate(_INVISIBLE).strip().rstrip(".").split())

@@ -209,8 +209,11 @@ def _print(
     for some, most in ((lines, 7), (findings, 4), (_refused_lines(result.refusals), 4)):
         print("".join(f"{line}\n" for line in shortened(some, most, verbose)), end="")
     if result.left_out:
-        whys = {name: f" ({reason})" for name, reason in result.reasons.items()}
-        print(f"not imported as tests: {listed([name + whys.get(name, '') for name in result.left_out], 5)}")
+        by_reason: dict[str, list[str]] = {}
+        for name in result.left_out:
+            by_reason.setdefault(result.reasons.get(name, ""), []).append(name)
+        whys = [listed(names, 3) + f" ({reason})" * bool(reason) for reason, names in by_reason.items()]
+        print(f"not imported as tests: {listed(whys, 5)}")
     _print_next_step(result, profile)
     tests = {record.provenance.get("file", "") for record in result.records}
     if out is not None:
@@ -272,8 +275,9 @@ def _refused_lines(all_refused: Sequence[Refusal]) -> list[str]:
         texts = {(refusal.error.found, getattr(refusal.error, "line", None)) for refusal in refusals}
         first = "" if len(texts) == 1 else f"the first of them{f', line {line}' if line else ''}: "
         remedy = f"; {error.remedy}" if error.remedy else ""
-        tests = counted(_refused_tests(refusals), "test")
-        lines.append(f"refused {tests} in {folder} ({shown}): {first}{error.found}{remedy} [{error.code}]")
+        tests = f"{counted(_refused_tests(refusals), 'test')} in {folder} ({shown})"
+        again = any(line.startswith(f"refused {tests}: ") for line in lines)
+        lines.append(f"refused {'the same tests' if again else tests}: {first}{error.found}{remedy} [{error.code}]")
     return lines
 
 
