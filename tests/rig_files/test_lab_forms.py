@@ -10,13 +10,13 @@ import scipy.io
 from support.rig_files import tdms_bytes
 
 from mrdamper.errors import InputError
+from mrdamper.rig_files import tests_table
 from mrdamper.rig_files.column_names import units_in
 from mrdamper.rig_files.preview import guess_profile
 from mrdamper.rig_files.profile import parse_profile, profile_text
 from mrdamper.rig_files.profile_template import profile_template
 from mrdamper.rig_files.readers.arrays import unit_in
 from mrdamper.rig_files.rig_import import found_tests, import_files, read_run, read_runs
-from mrdamper.rig_files.tests_table import tests_text
 
 T = np.arange(0.0, 4.0, 0.005)
 V = np.cos(2 * np.pi * T)
@@ -1451,7 +1451,7 @@ def test_one_remedy_leaves_out_every_test_that_a_plan_discards(tmp_path):
         'set [file] leave_out = ["run_1.csv", "run_3.csv"]'
     ]
     records, _ = found_tests([tmp_path])
-    assert [line.split(",")[2] for line in tests_text(records).splitlines()] == ["current_A", "", "0.5", ""]
+    assert [line.split(",")[2] for line in tests_table.tests_text(records).splitlines()] == ["current_A", "", "0.5", ""]
     (tmp_path / "tests.csv").write_text("file,current_A\nrun_1.csv,0.25\nrun_3.csv,0.75\n")  # both are valid
     result = import_files([tmp_path])
     assert by_id(result) == {"run_1": 0.25, "run_2": 0.5, "run_3": 0.75}

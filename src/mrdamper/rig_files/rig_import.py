@@ -187,9 +187,7 @@ class _Intake:
         self._pending: list[tuple[Path, Record]] = []
         self._found: list[tuple[Path, Record]] = []
         self.unchecked: list[tuple[Path, Record]] = []  # every test, also those refused
-        self.disputed: dict[
-            tuple[Path, str], InputError
-        ] = {}  # by file and test: currents, remarks
+        self.disputed: dict[tuple[Path, str], InputError] = {}  # by file and test: currents, remarks
         self.refusals: list[Refusal] = []
         self.notes: list[Refusal] = []  # texts of a folder that hold no table
         self.omitted: dict[Path, str] = {}  # tests that the profile leaves out, files of those that repeat another: why
