@@ -8,10 +8,11 @@ import pytest
 from scipy.io import savemat
 
 from mrdamper.cli.output import finding_lines
+from mrdamper.rig_files import tests_table
 from mrdamper.rig_files.mapping.proposals import displacement_of
 from mrdamper.rig_files.preview import question_of
 from mrdamper.rig_files.profile import parse_profile
-from mrdamper.rig_files.rig_import import import_files
+from mrdamper.rig_files.rig_import import found_tests, import_files
 from mrdamper.rig_files.rig_record import recording_time
 
 T = np.arange(0.0, 3.0, 0.002)
@@ -629,6 +630,33 @@ def test_a_current_of_the_profile_is_compared_with_a_channel_that_the_profile_do
     found = import_files([tmp_path], parse_profile(f"[file]\nblocks = 'join'\n[current]\nvalue = {value}"))
     assert [refusal.error.code for refusal in found.refusals] == codes
     assert [float(np.mean(record.current)) for record in found.records] == ([] if codes else [value])
+
+
+@pytest.mark.parametrize("in_one_file", [False, True])
+def test_a_current_of_two_digits_beside_one_with_a_zero_first_is_asked_and_answered_by_the_table(tmp_path, in_one_file):
+    t = np.arange(0.0, 6.0, 0.002)
+    x, v = 0.01 * np.sin(2 * np.pi * t), 0.02 * np.pi * np.cos(2 * np.pi * t)
+    tests = {"00A": 0.0, "05A": 0.5, "15A": 1.5}
+    forces = {tag: (300 + 500 * current) * np.sign(v) + 4000 * v for tag, current in tests.items()}
+    if in_one_file:
+        columns = {f"{name}_{tag}": values for tag, f in forces.items() for name, values in (("x", x), ("F", f))}
+        units = "time t in s, displacement x in m, force F in N"
+        savemat(tmp_path / "a.mat", {"t": t, "info": units, **columns})
+    for tag, force in {} if in_one_file else forces.items():
+        header = "Time [s],Position [m],Force [N]"
+        np.savetxt(tmp_path / f"a_{tag}.csv", np.column_stack([t, x, force]), delimiter=",", header=header, comments="")
+    refused = import_files([tmp_path])
+    assert {refusal.error.code for refusal in refused.refusals} == {"E_CURRENT_MISSING", "E_AMBIGUOUS"}
+    records = found_tests([tmp_path])[0]
+    lines = tests_table.tests_text(records).splitlines()
+    assert [line.split(",")[2] for line in lines] == ["current_A", "0", "", ""]
+    filled = [
+        line.replace(",,,train", f",{current},,train") for line, current in zip(lines[2:], (0.5, 1.5), strict=True)
+    ]
+    (tmp_path / "tests.csv").write_text("\n".join([*lines[:2], *filled]), encoding="utf-8")
+    found = import_files([tmp_path])
+    assert found.refusals == ()
+    assert [float(np.mean(record.current)) for record in found.records] == [*tests.values()]
 
 
 @pytest.mark.parametrize(("stated", "contradicts"), [(1.0, False), (0.7, False), (3.0, True)])

@@ -123,6 +123,9 @@ class Statement(NamedTuple):
     whence: str
 
 
+PADDED = re.compile(r"(?<![0-9.,xpA-Za-z])0[0-9]A(?![A-Za-z0-9])")  # 05A: half an ampere, or five
+
+
 def currents_in(text: str) -> tuple[float, ...]:
     """Coil currents [A] in a title, a sheet's or a file's name: every distinct one.
 

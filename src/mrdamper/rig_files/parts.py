@@ -15,7 +15,7 @@ from mrdamper.data.arrays import odd_steps
 from mrdamper.errors import InputError, listed
 from mrdamper.rig_files.column_names import DIMENSION, RATING, UNIT_KEYS, is_unit, role_of, split_name, words, words_of
 from mrdamper.rig_files.columns import column_called
-from mrdamper.rig_files.conditions import currents_in, damper_in, numbers_test, states_motion
+from mrdamper.rig_files.conditions import PADDED, currents_in, damper_in, numbers_test, states_motion
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import Content, RawTable, Words
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED, Finding
@@ -201,7 +201,7 @@ def _groups(table: RawTable, form: FileForm) -> list[RawTable]:
             if len(own) == len(members) and not RATING.search(line):
                 titles |= dict(zip(places, own, strict=True))
                 break
-    stated = all(currents_in(title) for title in titles.values())
+    stated = all(currents_in(title) or PADDED.search(title) for title in titles.values())
     if not (own_time or stated or form.blocks == "split" or _name_tests(table, members, titles)):
         return []
     grouped = {i for roles in members.values() for i in roles.values()}

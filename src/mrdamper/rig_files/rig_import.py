@@ -21,6 +21,7 @@ from mrdamper.data.temporary import without_temporary_folder
 from mrdamper.data.wording import counted
 from mrdamper.errors import ColumnError, CombinedError, InputError, is_a, shown, validate_arguments
 from mrdamper.rig_files import coil_current
+from mrdamper.rig_files.conditions import PADDED
 from mrdamper.rig_files.file_records import clock_of, files_in, headings_of, records_of_file, unpacked
 from mrdamper.rig_files.mapping import plans
 from mrdamper.rig_files.mapping.companions import holds_channels, is_helper, is_list, joined_files, number_of, part_of
@@ -39,7 +40,7 @@ from mrdamper.rig_files.sequences import clock_goes_on, follows, goes_on, is_nex
 from mrdamper.rig_files.tests_table import NAME as TESTS
 from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests, names_tests
 
-_PADDED = re.compile(r"(?<![0-9.,xpA-Za-z])0[0-9]A(?![A-Za-z0-9])")
+_OF_NAME = re.compile("file name|the title")  # beginning of where a current stands there
 _TWO_DIGITS = re.compile(r"(?<![0-9.,xpA-Za-z])[1-9][0-9]A(?![A-Za-z0-9])")
 _IDLE = re.compile("(?i)_(?:0|idle|pause|rest)$")  # of the tests that a column numbers
 _Tests = list[tuple[Path, Record]]
@@ -156,7 +157,7 @@ def import_files(
         texts = [*lists, *(path for path in left_out if path.suffix.lower() in SHORT_TEXTS)]
         left_out += [*lists, *(path for path in files if profile.leaves_out(*path.parts))]
         files, texts = ([path for path in of if not profile.leaves_out(*path.parts)] for of in (files, texts))
-        intake = _Intake(profile, table)
+        intake = _Intake(profile, table, (path.name for path in files))
         for number, path in enumerate(files):
             progress(path.name, number / len(files))
             intake.read(path, given=path in given)
@@ -180,8 +181,8 @@ def import_files(
 class _Intake:
     """The tests of a set of files: checked, refused, or still without a current that another file may state."""
 
-    def __init__(self, profile: Profile, table: TestsTable | None):
-        self._profile, self._table = profile, table
+    def __init__(self, profile: Profile, table: TestsTable | None, names: Iterable[str]):
+        self._profile, self._table, self._names = profile, table, [*names]  # of all files
         self._order: dict[Path, int] = {}
         self._parts: list[tuple[Path, list[Record]]] = []  # the last file and those that it continues, with their tests
         self._pending: list[tuple[Path, Record]] = []
@@ -256,7 +257,7 @@ class _Intake:
         idle = [r for r in records if len(records) > 1 and _IDLE.search(r.id) and plans.rests(r)]
         self.omitted |= {Path(record.id): "it rests" for record in idle}
         records = [record for record in records if record not in idle] or records
-        for record in records:
+        for record in self._without_doubtful_points(path, records):
             self.met += [(path, record.id)] * as_listed
             record = applied(record, path, self._table) if as_listed else record
             if record.current is None or record.doubt:
@@ -299,7 +300,6 @@ class _Intake:
                 record = applied(record, path, self._table)
             record = coil_current.with_current_behind_label(record, path, names)
             self._check(path, record, several=counts[path] > 1)
-        self._refuse_names_without_point()
         whence = {file: record.provenance.get("current_from", "") for file, record in self._found}
         notes = [Path(note.file) for note in self.notes]
         every = dict.fromkeys((*others, *notes, *texts, *self._plans))
@@ -553,14 +553,16 @@ class _Intake:
             tests += [(path, applied(test, path, self._table)) for test in numbered] or own
         return tests
 
-    def _refuse_names_without_point(self) -> None:
-        """Refuse currents of two digits in names, where another name of the set begins such a number with a zero."""
-        if not any(_PADDED.search(path.name) for path in self._order):
-            return
+    def _without_doubtful_points(self, path: Path, records: list[Record]) -> list[Record]:
+        """Return tests without the current of two digits of a name, where another name begins one with a zero: 05A."""
+        if not any(map(PADDED.search, [*self._names, *(record.id for record in records)])):
+            return records
         problem = "a current of two digits, beside names such as 05A: is the decimal point missing?"
         remedy = "write the currents into tests.csv (--write-tests)"
-        error = ColumnError(problem, remedy=remedy, code="E_AMBIGUOUS")
-        self._refuse({i: error for i, (file, _) in enumerate(self.tests()) if _TWO_DIGITS.search(file.name)})
+        doubt = ColumnError(problem, where=path.name, remedy=remedy, code="E_AMBIGUOUS")
+        named = [r for r in records if _OF_NAME.match(r.provenance.get("current_from", ""))]
+        doubtful = [r.id for r in named if any(map(_TWO_DIGITS.search, (path.name, r.id)))]
+        return [replace(r, current=None, doubt=r.doubt or doubt) if r.id in doubtful else r for r in records]
 
     def tests(self) -> list[tuple[Path, Record]]:
         """The accepted tests with their files, in the order of these."""
@@ -595,8 +597,9 @@ def found_tests(
     """
     with unpacked(paths) as given:
         files, others = files_in(given)
-        intake = _Intake(profile_of(profile), None)
-        for path in [path for path in files if not profile_of(profile).leaves_out(path.name)]:
+        files = [path for path in files if not profile_of(profile).leaves_out(path.name)]
+        intake = _Intake(profile_of(profile), None, (path.name for path in files))
+        for path in files:
             intake.read(path, given=path in given)
         intake.join([path for path in others if path.suffix.lower() in SHORT_TEXTS])
         refusals = [refusal for refusal in intake.refusals if not refusal.run]

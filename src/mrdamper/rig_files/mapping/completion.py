@@ -22,7 +22,7 @@ from mrdamper.rig_files.column_names import (
     split_name,
     words,
 )
-from mrdamper.rig_files.conditions import LONGEST_LINE, currents_in, damper_in, without_currents
+from mrdamper.rig_files.conditions import LONGEST_LINE, PADDED, currents_in, damper_in, without_currents
 from mrdamper.rig_files.mapping import scales
 from mrdamper.rig_files.mapping.clocks import with_axis_as_time, with_epoch
 from mrdamper.rig_files.readers.base import RawTable
@@ -368,11 +368,11 @@ def _with_titles(table: RawTable) -> RawTable:
                 names[i] = bare.name
                 units[i] = units[i] or header.unit or bare.unit
                 over[i] = f"{title} {name}".strip()
-        stated = currents_in(names[i])
-        rest = without_currents(names[i]).strip(" ,;:@-_/") if len(stated) == 1 else ""
+        bare_name = without_currents(names[i]) if len(currents_in(names[i])) == 1 else PADDED.sub("", names[i])
+        rest = bare_name.strip(" ,;:@-_/") if bare_name != names[i] else ""
         if rest and split_name(rest, units[i]).role in ("force", "displacement", "time", "velocity"):
             over[i] = over[i] if currents_in(over[i]) else f"{over[i]} {names[i]}".strip()
-            names[i] = without_currents(names[i]).strip(" ,;:@-_/")
+            names[i] = rest
     if names == list(table.names) and units == list(table.units):
         return table
     return replace(table, names=tuple(names), units=tuple(units), over=tuple(over) if any(over) else ())
