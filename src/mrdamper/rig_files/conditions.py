@@ -99,6 +99,8 @@ BARE_RATE = re.compile(r"(?i)f_?s|(?:sampl(?:e|ing)|scan|abtast)[ _]?(?:rate|fre
 _BARE_STEP = re.compile(
     r"(?i)d_?t|delta_?t|(?:sampl(?:e|ing)|time|wf|x)[ _]?(?:delta|step|inc(?:r(?:ement)?)?|interval)|delta_?x"
 )
+PADDED = re.compile(r"(?<![0-9.,xpA-Za-z])0[0-9]A(?![A-Za-z0-9])")  # 05A: half an ampere, or five
+_TWO_DIGITS = re.compile(r"(?<![0-9.,xpA-Za-z])[1-9][0-9]A(?![A-Za-z0-9])")
 _START = re.compile(r"(?i)[tx]_?0|(?:start|x)[ _]?time|wf_start_offset|x_?start")
 _DAYS = tuple(  # the surest form first: 2024-05-31, 31/5/2024, 31 May 2024 and May 31, 2024
     re.compile(rf"(?<!\d){form}(?!\d)")
@@ -121,9 +123,6 @@ class Statement(NamedTuple):
 
     amperes: float
     whence: str
-
-
-PADDED = re.compile(r"(?<![0-9.,xpA-Za-z])0[0-9]A(?![A-Za-z0-9])")  # 05A: half an ampere, or five
 
 
 def currents_in(text: str) -> tuple[float, ...]:
@@ -157,6 +156,11 @@ def _in_ascii(text: str) -> str:
     text = unicodedata.normalize("NFKC", text)
     digits = text if text.isascii() else "".join(str(unicodedata.decimal(sign, sign)) for sign in text)
     return digits.replace("−", "-").replace("٫", ".")
+
+
+def may_lack_point(name: str, names: Iterable[str]) -> bool:
+    """Tell if the current of two digits in a name may lack its decimal point: 10A, beside a name such as 05A."""
+    return bool(_TWO_DIGITS.search(name)) and any(map(PADDED.search, names))
 
 
 def behind_digits(name: str) -> re.Match[str] | None:

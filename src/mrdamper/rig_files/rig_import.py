@@ -21,7 +21,7 @@ from mrdamper.data.temporary import without_temporary_folder
 from mrdamper.data.wording import counted
 from mrdamper.errors import ColumnError, CombinedError, InputError, is_a, shown, validate_arguments
 from mrdamper.rig_files import coil_current
-from mrdamper.rig_files.conditions import PADDED
+from mrdamper.rig_files.conditions import may_lack_point
 from mrdamper.rig_files.file_records import clock_of, files_in, headings_of, records_of_file, unpacked
 from mrdamper.rig_files.mapping import plans
 from mrdamper.rig_files.mapping.companions import holds_channels, is_helper, is_list, joined_files, number_of, part_of
@@ -41,7 +41,6 @@ from mrdamper.rig_files.tests_table import NAME as TESTS
 from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests, names_tests
 
 _OF_NAME = re.compile("file name|the title")  # beginning of where a current stands there
-_TWO_DIGITS = re.compile(r"(?<![0-9.,xpA-Za-z])[1-9][0-9]A(?![A-Za-z0-9])")
 _IDLE = re.compile("(?i)_(?:0|idle|pause|rest)$")  # of the tests that a column numbers
 _Tests = list[tuple[Path, Record]]
 _SomeTests = Sequence[tuple[Path, Record]]
@@ -554,14 +553,13 @@ class _Intake:
         return tests
 
     def _without_doubtful_points(self, path: Path, records: list[Record]) -> list[Record]:
-        """Return tests without the current of two digits of a name, where another name begins one with a zero: 05A."""
-        if not any(map(PADDED.search, [*self._names, *(record.id for record in records)])):
-            return records
+        """Return tests without a current that a name states in two digits, where its decimal point may be missing."""
+        names = [*self._names, *(record.id for record in records)]
         problem = "a current of two digits, beside names such as 05A: is the decimal point missing?"
         remedy = "write the currents into tests.csv (--write-tests)"
         doubt = ColumnError(problem, where=path.name, remedy=remedy, code="E_AMBIGUOUS")
         named = [r for r in records if _OF_NAME.match(r.provenance.get("current_from", ""))]
-        doubtful = [r.id for r in named if any(map(_TWO_DIGITS.search, (path.name, r.id)))]
+        doubtful = [r.id for r in named if may_lack_point(path.name, names) or may_lack_point(r.id, names)]
         return [replace(r, current=None, doubt=r.doubt or doubt) if r.id in doubtful else r for r in records]
 
     def tests(self) -> list[tuple[Path, Record]]:
