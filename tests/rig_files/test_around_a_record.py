@@ -88,6 +88,7 @@ def test_files_of_other_kinds_and_notes_are_named_and_left_out(tmp_path):
     found = import_files([tmp_path])
     assert (len(found.records), len(found.refusals)) == (1, 0)
     assert sorted(found.left_out) == ["README.txt", "photo.jpg"]
+    assert found.reasons == {"README.txt": "read for what it states of the columns"}
 
 
 @pytest.mark.parametrize(

@@ -1716,6 +1716,7 @@ def test_a_plan_that_names_some_of_the_tests_is_compared_with_them(tmp_path):
     [
         ("The forces are in N (the template says kN).", [("force", "N")]),
         ("displacement (mm), force (kN)", [("displacement", "mm"), ("force", "kN")]),
+        ("Время в секундах, сила в килоньютонах", [("time", "секундах"), ("force", "килоньютонах")]),
         ("| Amplitude (mm) | Current (A) | Force (kN) |", []), ("Test  Current (A)  Force (kN)", []),
         ("Figure 1: force (kN), displacement (mm)", []), ("model.py expects displacement in m, force in kN.", []),
         ("Max. values: Displacement (mm): 10.0, Force (kN): 1.2", []),

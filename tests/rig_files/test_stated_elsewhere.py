@@ -654,9 +654,12 @@ def test_a_current_of_two_digits_beside_one_with_a_zero_first_is_asked_and_answe
         line.replace(",,,train", f",{current},,train") for line, current in zip(lines[2:], (0.5, 1.5), strict=True)
     ]
     (tmp_path / "tests.csv").write_text("\n".join([*lines[:2], *filled]), encoding="utf-8")
-    found = import_files([tmp_path])
-    assert found.refusals == ()
-    assert [float(np.mean(record.current)) for record in found.records] == [*tests.values()]
+    values = parse_profile("[current.values]\n" + "\n".join(f"'*{tag}*' = {value}" for tag, value in tests.items()))
+    for profile in (None, values):
+        found = import_files([tmp_path], profile)
+        assert found.refusals == ()
+        assert [float(np.mean(record.current)) for record in found.records] == [*tests.values()]
+        (tmp_path / "tests.csv").unlink(missing_ok=True)
 
 
 @pytest.mark.parametrize(("stated", "contradicts"), [(1.0, False), (0.7, False), (3.0, True)])

@@ -28,6 +28,7 @@ _NOT_TAKEN = "not taken for it: "  # beginning of the finding on other currents
 CURRENT_TOO = "and give the current of each test"  # within the remedy of a refusal of units or columns
 _CALIBRATION = 'give its calibration, [channels.current] unit = "A" and scale (A per its unit), in a profile'
 _PROFILE = "profile"  # where a current stands
+OF_NAME = "file name", "the title"  # beginnings of where it stands in a name
 _DECIDE = "write the right one into tests.csv (--write-tests), or correct the one that is wrong"
 _CHANNEL_WRONG = (
     'if the channel is wrong, set [channels.current] unit = "A" and scale in a profile, or leave its column out there: '
@@ -130,7 +131,9 @@ def with_value_of_name(record: Record, path: Path, profile: Profile) -> Record:
         problem = printable(f"{patterns[0]!r} and {other!r} give {record.id} {value:g} and {values[other]:g} A")
         remedy = "correct [current.values] of the profile"
         raise ColumnError(problem, where=where, remedy=remedy, code="E_AMBIGUOUS")
-    return with_stated_current(replace(record, doubt=None), value, "profile", where)
+    by_name = record.current is not None and record.provenance.get("current_from", "").startswith(OF_NAME)
+    own = None if by_name and np.allclose(record.current, 10 * value) else record.current  # 10A beside 05A
+    return with_stated_current(replace(record, current=own, doubt=None), value, "profile", where)
 
 
 def _places(record: Record, path: Path) -> tuple[str, ...]:

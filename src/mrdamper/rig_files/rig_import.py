@@ -40,10 +40,10 @@ from mrdamper.rig_files.sequences import clock_goes_on, follows, goes_on, is_nex
 from mrdamper.rig_files.tests_table import NAME as TESTS
 from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests, names_tests
 
-_OF_NAME = re.compile("file name|the title")  # beginning of where a current stands there
 _IDLE = re.compile("(?i)_(?:0|idle|pause|rest)$")  # of the tests that a column numbers
 _Tests = list[tuple[Path, Record]]
 _SomeTests = Sequence[tuple[Path, Record]]
+_AS_NOTES = "read for what it states of the columns"
 _LARGEST_LIST = 2**16  # bytes of a plan of tests that states the current of none that was read
 _MAY_BE_PARTS = (
     "E_COLUMN", "E_UNITS_MISSING", "E_UNITS_DIMENSION", "E_AMBIGUOUS", "E_NO_DATA", "E_NUMBER", "E_FIELD_COUNT",
@@ -171,7 +171,8 @@ def import_files(
         left_out += [] if refusals is intake.notes else dict.fromkeys(Path(note.file) for note in intake.notes)
         left_out += intake.omitted
         names = last_parts(path.parts for path in left_out)
-        why = intake.omitted | {Path(note.file): intake.reason(note) for note in intake.notes}
+        why = {path: _AS_NOTES for path in left_out if is_readme(path) and not profile.leaves_out(*path.parts)}
+        why |= intake.omitted | {Path(note.file): intake.reason(note) for note in intake.notes}
         reasons = {names[path.parts]: text for path, text in why.items() if text and path.parts in names}
         left_out_names = tuple(names[path.parts] for path in left_out)
         return ImportResult(with_unique_ids(_with_folders(intake.tests())), named, left_out_names, reasons)
@@ -327,10 +328,11 @@ class _Intake:
 
     def reason(self, note: Refusal) -> str:
         """Tell why a file of the folder is no test and, where it lists currents, why they were not used."""
-        results = self._results(Path(note.file))
+        path = Path(note.file)
+        results = self._results(path)
         if results is None:
-            return note.error.found
-        if Path(note.file) in self._awaited:
+            return _AS_NOTES if is_readme(path) or is_description(path) else note.error.found
+        if path in self._awaited:
             return f"currents under {results.title!r}, used once the columns are known"
         keys = ", ".join(filter(None, results.keys))
         missing = [refusal for refusal in self.refusals if refusal.error.code == "E_CURRENT_MISSING"]
@@ -558,7 +560,7 @@ class _Intake:
         problem = "a current of two digits, beside names such as 05A: is the decimal point missing?"
         remedy = "write the currents into tests.csv (--write-tests)"
         doubt = ColumnError(problem, where=path.name, remedy=remedy, code="E_AMBIGUOUS")
-        named = [r for r in records if _OF_NAME.match(r.provenance.get("current_from", ""))]
+        named = [r for r in records if r.provenance.get("current_from", "").startswith(coil_current.OF_NAME)]
         doubtful = [r.id for r in named if may_lack_point(path.name, names) or may_lack_point(r.id, names)]
         return [replace(r, current=None, doubt=r.doubt or doubt) if r.id in doubtful else r for r in records]
 
