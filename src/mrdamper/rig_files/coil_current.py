@@ -131,8 +131,9 @@ def with_value_of_name(record: Record, path: Path, profile: Profile) -> Record:
         problem = printable(f"{patterns[0]!r} and {other!r} give {record.id} {value:g} and {values[other]:g} A")
         remedy = "correct [current.values] of the profile"
         raise ColumnError(problem, where=where, remedy=remedy, code="E_AMBIGUOUS")
-    by_name = record.current is not None and record.provenance.get("current_from", "").startswith(OF_NAME)
-    own = None if by_name and np.allclose(record.current, 10 * value) else record.current  # 10A beside 05A
+    own = record.current
+    if own is not None and record.provenance.get("current_from", "").startswith(OF_NAME):
+        own = None if np.allclose(own, 10 * value) else own  # 10A beside 05A
     return with_stated_current(replace(record, current=own, doubt=None), value, "profile", where)
 
 

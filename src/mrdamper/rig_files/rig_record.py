@@ -14,7 +14,7 @@ from mrdamper.data.wording import counted
 from mrdamper.errors import ColumnError, CombinedError, InputError, listed, printable
 from mrdamper.physics.motion.measured import smooth
 from mrdamper.rig_files import coil_current
-from mrdamper.rig_files.column_names import DIMENSION, Unit, role_of, shown_unit, words
+from mrdamper.rig_files.column_names import DIMENSION, KEYS, Unit, role_of, shown_unit, words
 from mrdamper.rig_files.columns import Assigned, assign, index_of_samples, noted_columns, rate_of
 from mrdamper.rig_files.conditions import day_in, stated_motion, stated_quantities, time_in
 from mrdamper.rig_files.mapping.clocks import past_midnight, refuse_two_rates
@@ -282,6 +282,7 @@ def _remarks(table: RawTable, profile: Profile, assigned: dict[str, Assigned]) -
     sessions = [i for i, header in enumerate(table.headers) if header.name.casefold() == "session"]
     session = table.words(sessions[0]).labels if table.words and len(sessions) == 1 else ()
     columns += sessions if len(session) == 1 else []
+    columns += [0] if table.names[0].casefold().endswith((*KEYS["name"],)) else []  # TraceName, before the names
     ignored = [name for i, name in enumerate(table.names) if name and i not in used and i not in columns]
     taken = [f"{role} = {table.title(e.column)} in {shown_unit(e.unit)}" for role, e in assigned.items()]
     remarks = {"columns": ", ".join(taken)} | ({"session": session[0]} if len(session) == 1 else {})
