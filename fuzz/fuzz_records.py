@@ -78,13 +78,12 @@ def damping_and_peak(record: Record) -> tuple[float, float]:
     record = replace(record, **{name: values[start:stop] for name, values in record.channels.items()})
     x, v, _ = smooth(record.time, record.displacement)
     amplitude = 0.5 * float(np.ptp(x))
-    steps = np.diff(x, prepend=x[0])
     rows = slice(x.size // 10, None, max(1, x.size // _ROWS))
     best = (np.inf, 0.0)
+    low, high = -_YIELD * amplitude, _YIELD * amplitude
     state, states = np.zeros(_YIELD.size), np.empty((x.size, _YIELD.size))
-    for i, step in enumerate(steps):
-        state = np.clip(state + step, -_YIELD * amplitude, _YIELD * amplitude)
-        states[i] = state
+    for row, step in zip(states, np.diff(x, prepend=x[0]), strict=True):
+        state = np.minimum(np.maximum(np.add(state, step, out=row), low, out=row), high, out=row)
     base = np.column_stack([np.ones_like(x), x / amplitude, v])[rows]
     for column in states.T:
         table = np.column_stack([base, column[rows] / amplitude])
