@@ -60,6 +60,15 @@ def test_units_in_capitals_are_read(tmp_path, heading, value):
     assert np.mean(record.current) == pytest.approx(0.5)
 
 
+def test_columns_whose_names_end_in_a_numbered_run_are_its_tests(tmp_path):
+    runs, channels = ("Run #1 0.5 A", "Run #2 1 A"), ("Time (s)", "Position (mm)", "Force (N)")
+    heads = tuple(f"{channel} {run}" for run in runs for channel in channels)
+    first = (TIME, 20 * np.sin(PHASE), force(PHASE))
+    found = imported(tmp_path, "test.csv", heads, (*first, *(2 * of for of in first)))
+    assert found.refusals == ()
+    assert [float(np.mean(record.current)) for record in found.records] == [0.5, 1.0]
+
+
 def test_a_unit_in_capitals_against_the_size_of_the_current_is_refused(tmp_path):
     heads = ("TIME [S]", "DISPLACEMENT [MM]", "FORCE [N]", "CURRENT [MA]")
     columns = (TIME, 20 * np.sin(PHASE), force(PHASE), np.full(TIME.size, 0.5))

@@ -155,6 +155,11 @@ _INNER = re.compile(
     r"^(?P<name>[^\[({<]+?)\s*[\[({<](?P<unit>[^\[\](){}<>]{1,20})[\])}>]\s*(?:[-–:,;@|/]|(?:at|for|bei|mit|à|con|com)\b).*$",
     re.DOTALL,
 )
+_RUN_BEHIND = re.compile(
+    rf"(?i)^(?P<name>[^\[({{<]+?)\s*[\[(](?P<unit>[^\[\](){{}}<>]{{1,20}})[\])]\s+"
+    rf"(?P<run>(?:{'|'.join(words('run'))})\W*[0-9].*)$",
+    re.DOTALL,
+)
 _SLASHED = re.compile(r"^(?P<name>.*\S)\s*(?:\s/\s*|,\s*|\s+(?:in|en|em)\s+|\s*;\s*)(?P<unit>\S{1,20})$", re.DOTALL)
 _EAST_ASIAN = re.compile("[\u3040-\u30ff\u4e00-\u9fff\uac00-\ud7af]")
 _LONGEST_NAME = 200  # beyond, it is no name, and matching it could take long
@@ -219,6 +224,9 @@ def split_name(header: str, unit: str = "") -> Header:
         match = pattern.match(text)
         if match and parse_unit(match["unit"].strip()):
             return Header(match["name"].strip(), match["unit"].strip())
+    run = _RUN_BEHIND.match(text)
+    if run and parse_unit(run["unit"].strip()):  # Force (N) Run #1
+        return Header(f"{run['name']} {run['run']}", run["unit"].strip())
     inner = _INNER.match(text)
     if inner and parse_unit(inner["unit"].strip()):  # Position (mm) - Mod1/ai0
         return Header(inner["name"].strip(), inner["unit"].strip())
