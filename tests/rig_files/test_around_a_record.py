@@ -179,7 +179,8 @@ def test_a_rating_a_scale_or_a_list_states_no_current(line):
     "line", ["Test 3, 0.4 A", "2023/05/11, 0.4 A, 2 Hz", "Run 12 - 0.4 A", "10 mm, 1 Hz, 0.4 A", "Test 3 = 0.4 A"]
 )
 def test_a_number_before_a_current_makes_no_list(line):
-    assert [statement.amperes for statement in stated_in_titles([line])] == [0.4]
+    device = "Recorder DCS-100A, SN 12"
+    assert [statement.amperes for statement in stated_in_titles([line, device])] == [0.4]
 
 
 def test_a_tolerance_is_no_current():

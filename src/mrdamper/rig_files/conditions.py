@@ -287,6 +287,8 @@ def stated_in_titles(lines: Iterable[str]) -> list[Statement]:
         stated = () if no_test else currents_in(_TOLERANCE.sub("", line))
         if len(stated) == 1:
             statements.append(Statement(stated[0], f"the line {line.strip()[:60]!r}"))
+    possible = [statement for statement in statements if abs(statement.amperes) <= LARGEST_STATED]  # DCS-100A: a device
+    statements = possible or statements
     return statements if len({statement.amperes for statement in statements}) == 1 else []
 
 
