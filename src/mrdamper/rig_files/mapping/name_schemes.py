@@ -18,7 +18,10 @@ _LEGEND = re.compile(  # I1 = 0.3 A, cur0.8 = coil current 0.8 A (as set)
     r"\s*(?:\([^()]*\))?\s*$"
 )
 _AT_SYMBOL = re.compile(r"(?<![^\W_])([A-Za-z]{1,8})([0-9]+(?:[.p][0-9]+)?)(?![^\W_])")  # I0p5
-_DECIMAL_CODE = re.compile(r"(?<![a-z])[a-z]{1,6}[0-9]+\.[0-9]+(?![0-9])")
+_DECIMAL_CODE = re.compile(  # i0.5; 1.5v of a driver
+    r"(?<![a-z])[a-z]{1,6}[0-9]+\.[0-9]+(?![0-9])|(?<![0-9a-z.])[0-9]+(?:\.[0-9]+)?m?v(?![0-9a-z])"
+)
+_CODES, _OF_CODES = re.compile("(?:[a-z]{1,6}[0-9]+){2,}"), re.compile("[a-z]+[0-9]+")  # c2f1
 _SCHEME = re.compile(r"[\w.,+=-]*(?:<[^<>]{1,60}>[\w.,+=-]*)+")  # MRD_A<amplitude in mm>_I<coil current in A>.csv
 _ATTACHED, _JOINED = re.compile(r"(?<=\w)[(\[{]([^()\[\]{}<>]{1,60})[)\]}]"), re.compile(r"\w[(\[{][^_]*[)\]}]_")
 _PLACE = re.compile(r"[\s*`-]*([^\W\d_]{1,12})`?(?:\s*[=:]|\s+[-–]\s|\s{2,})\s*([^\s<>][^<>]{0,58}[^\s<>])\s*$")
@@ -50,10 +53,14 @@ def by_legend(lines: Sequence[str], tests: Tests) -> list[tuple[float, str]]:
     names_of = [f"{file.stem} {record.id}".casefold() for file, record in tests]
     stems = [re.sub(r"(?<=[A-Za-z])0+(?=[0-9])", "", name) for name in names_of]
     words = [[*re.split(r"[^0-9A-Za-z]+", s), *_DECIMAL_CODE.findall(s.replace(",", "."))] for s in stems]
+    words = [
+        [*own, *(code for word in own if _CODES.fullmatch(word) for code in _OF_CODES.findall(word))] for own in words
+    ]
     codes = _with_scale(dict(stated), {word for own in words for word in own})
     if len(codes) < 2 or len(codes) < len(stated):
         return []
     own = [[code for code in codes if code in {*parts} | names] for parts, names in zip(words, files, strict=True)]
+    own = [[code for code in of if not any(code in o and "." in o for o in of if o != code)] for of in own]  # 4.5v
     return [(codes[of[0]], of[0].upper()) for of in own] if all(len(of) == 1 for of in own) else []
 
 
@@ -143,8 +150,9 @@ def _numbers_of_currents(name: str) -> list[float]:
 def _meant(key: str, files: Collection[str]) -> list[str]:
     """Return the codes that the key of a legend names, or the file: I1, test01-test04, a.dat."""
     code = _CODE.fullmatch(key)
-    if code is None and _DECIMAL_CODE.fullmatch(key.casefold().replace(",", ".")):
-        return [key.casefold().replace(",", ".")]
+    level = re.sub("(?<=[0-9]) (?=m?v$)", "", key.rpartition(": ")[2].casefold().replace(",", "."))  # driver: 1,5 V
+    if code is None and _DECIMAL_CODE.fullmatch(level):
+        return [level]
     if code is None:
         return [key.casefold()] if key.casefold() in files else []
     return [f"{code[1].casefold()}{number}" for number in range(int(code[2]), int(code[3] or code[2]) + 1)]
