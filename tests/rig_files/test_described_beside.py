@@ -322,10 +322,45 @@ def test_starts_and_ends_that_a_plan_states_for_each_file_cut_its_record_into_te
     assert not result.left_out
 
 
-def test_a_remark_in_brackets_behind_a_legend_may_have_a_comma(tmp_path):
+@pytest.mark.parametrize(
+    ("names", "text"),
+    [
+        ("m07 m08 m09", "Codes: m07 = 0.2 A, m08 = 0.9 A, m09 = 0 A (coil current, held constant)"),
+        ("I1F2 I2F1 I3F1", "I1 = 0.2 A\nI2 = 0.9 A\nI3 = 0 A\nF1 = 1 Hz\nF2 = 2 Hz"),  # codes without a mark between
+        ("a_1V_2Hz b_4.5V_1Hz c_5V", "Coil current by the driver's input: 1 V = 0,2 A; 4,5 V = 0.9 A; 5 V = 0 A"),
+    ],
+)
+def test_a_legend_gives_the_currents_of_codes_and_of_voltages_in_names(tmp_path, names, text):
     write(tmp_path, UNITS)
-    (tmp_path / "README.txt").write_text("Codes: m07 = 0.2 A, m08 = 0.9 A, m09 = 0 A (coil current, held constant)\n")
+    for old, new in zip(CURRENTS, names.split(), strict=True):
+        (tmp_path / f"{old}.csv").rename(tmp_path / f"{new}.csv")
+    (tmp_path / "README.txt").write_text(f"{text}\n")
     require_the_tests(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("text", "profile", "expected"),
+    [
+        ("`F1` is the force at 0.5 A, `F2` that at 1 A, `F3` that at 2 A.", "", [0.5, 1.0, 2.0]),
+        ("- `F1`: force at 0.5 A\n- `F2`: force at 1 A\n- `F3`: force at 2 A", "", [0.5, 1.0, 2.0]),
+        ("- `F1`: force at 0.5 A\n- `F2`: force at 1 A", "", ["E_AMBIGUOUS"]),
+        ("0.5 A: F1, 1 A: F2, 2 A: F3, 3 A: not recorded", "", ["E_AMBIGUOUS"]),
+        ("", '[file]\nblocks = "split"\n[current.values]\n"*F1" = 0.5\n"*F2" = 1\n"*F3" = 2', [0.5, 1.0, 2.0]),
+        ("", '[channels.force]\ncolumn = "F1"\n[current]\nvalue = 0.5', [0.5]),
+    ],
+)
+def test_several_forces_beside_one_motion_are_tests_by_a_text_or_by_the_profile(tmp_path, text, profile, expected):
+    table = np.column_stack([T, X, *map(force, (0.5, 1.0, 2.0))])
+    np.savetxt(tmp_path / "sine.csv", table, delimiter=",", header="t [s],x [mm],F1 [N],F2 [N],F3 [N]", comments="")
+    (tmp_path / "README.md").write_text(f"# Columns\n\n{text}\n")
+    found = import_files([tmp_path], parse_profile(profile))
+    told = [float(np.mean(record.current)) for record in found.records] or [r.error.code for r in found.refusals]
+    assert told == expected
+    if "column" in profile:
+        assert any(f.text.startswith("F2 [N], F3 [N] not taken") for f in found.records[0].findings)
+    for refusal in found.refusals:
+        assert "'F1 [N]' and 'F2 [N]' and 'F3 [N]' may each be the force" in refusal.error.found
+        assert 'blocks = "split" if each force is a test' in refusal.error.remedy
 
 
 @pytest.mark.parametrize(
@@ -444,6 +479,8 @@ def test_a_list_of_variables_names_columns_called_by_number_also_from_the_folder
     tests = "".join(f"{name};{amperes}\n" for name, amperes in CURRENTS.items())
     (tmp_path / "deneyler.csv").write_text(f"deney;akim_A\n{tests}")
     require_the_tests(tmp_path)
+    alone = {refusal.error.code for refusal in import_files([tmp_path / folder]).refusals}
+    assert alone == ({"E_COLUMN"} if folder else set())  # a text above what is read may be of another rig
 
 
 @pytest.mark.parametrize(

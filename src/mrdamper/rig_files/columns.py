@@ -157,10 +157,11 @@ def noted_columns(table: RawTable, profile: Profile, assigned: Mapping[str, Assi
         text = f"the tests of {len(others)} columns named after other currents are not taken: {', '.join(others)}; "
         yield Finding("W_COLUMN", f"{text}to take each, leave [channels.force] column out of the profile")
     both = [role for role in ("displacement", "force") if role in columns and profile.channel(role).column is not None]
-    further = [[i for i in table.columns(of, table.headers[columns[of]].dimension) if i != columns[of]] for of in both]
-    noted = len(both) > 1 and all(further) and not others
+    further = {of: table.columns(of, table.headers[columns[of]].dimension) for of in both}
+    further = {of: [i for i in alike if i != columns[of]] for of, alike in further.items()}
+    noted = not others and (all(further.values()) if len(both) > 1 else len(further.get("force", ())) > 1)
     if noted:
-        text = " and ".join(listed([table.title(i) for i in own], 3) for own in further)
+        text = " and ".join(listed([table.title(i) for i in own], 3) for own in further.values())
         yield Finding("W_COLUMN", f"{text} not taken; if they are further tests, import each with a profile of its own")
     for role in [role for role in SIGNED if role in assigned and not noted]:
         same = _differing(table, columns[role])
@@ -374,7 +375,8 @@ def _missing(table: RawTable, columns: Mapping[str, int], profile: Profile) -> l
 
 
 def _ambiguous(table: RawTable, role: str, columns: Sequence[int]) -> RigFileError:
-    problem = f"{' and '.join(repr(table.names[i]) for i in columns[:3])} may both be the {role}"
+    problem = f"{' and '.join(repr(table.names[i]) for i in columns[:6])} may {'both' if len(columns) < 3 else 'each'}"
+    problem += f" be the {role}"
     about = [line.strip()[:120] for line in table.lines if any(find_name(line, table.headers[i].name) for i in columns)]
     problem += f"; beside them stands {' and '.join(map(repr, about[:2]))}" if about else ""
     remedy = f'set [channels.{role}] column = "..."{_or_split(table)} in a profile'
@@ -382,8 +384,15 @@ def _ambiguous(table: RawTable, role: str, columns: Sequence[int]) -> RigFileErr
 
 
 def _or_split(table: RawTable) -> str:
-    pairs = len(table.columns("displacement")) == len(table.columns("force")) > 1
-    return ', or [file] blocks = "split" if each displacement has its force and is a test,' if pairs else ""
+    motions, forces = (len(table.columns(role)) for role in ("displacement", "force"))
+    each = (
+        "each displacement has its force and"
+        if motions == forces
+        else "each force"
+        if motions == 1 and forces > 2
+        else ""
+    )
+    return f', or [file] blocks = "split" if {each} is a test,' if each and forces > 1 else ""
 
 
 def sign_of(table: RawTable, profile: Profile, role: str) -> int | None:

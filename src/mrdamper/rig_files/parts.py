@@ -46,7 +46,7 @@ def tests_of(table: RawTable, form: FileForm, stated: Mapping[str, str | int]) -
         parts = _by_run(table, column, stated=form.run_column is not None)
         if parts:
             return parts
-    return _with_stated(table, _groups(table, form) or _shared_motion(table), stated) or [table]
+    return _with_stated(table, _groups(table, form) or _shared_motion(table, form), stated) or [table]
 
 
 def _with_stated(table: RawTable, tests: list[RawTable], stated: Mapping[str, str | int]) -> list[RawTable]:
@@ -243,14 +243,16 @@ def _alike(one: np.ndarray, other: np.ndarray, limit: float) -> bool:
     return bool(np.std(difference[there]) <= limit * max(np.std(one[there]), np.std(other[there])))
 
 
-def _shared_motion(table: RawTable) -> list[RawTable]:
-    """One motion with several forces, each of which has a title that states its current: a test each."""
+def _shared_motion(table: RawTable, form: FileForm) -> list[RawTable]:
+    """One motion with several forces, a test each, if a title of each states its current, or the profile splits it."""
     forces = [i for i in table.columns("force") if table.headers[i].dimension in (None, "force")]
     titles = [table.over[i] if table.over else "" for i in forces]
     stated = [currents_in(title) for title in titles]
-    if len(forces) < 2 or len(table.columns("displacement")) != 1 or any(len(currents) != 1 for currents in stated):
+    if len(forces) < 2 or len(table.columns("displacement")) != 1:
         return []
-    if len(set(stated)) < len(stated):
+    if form.blocks == "split" and not any(titles):
+        titles = [table.headers[i].name for i in forces]
+    elif any(len(currents) != 1 for currents in stated) or len({*stated}) < len(stated):
         return []
     others = [i for i in range(len(table.names)) if i not in forces]
     tests = zip(titles, forces, strict=True)

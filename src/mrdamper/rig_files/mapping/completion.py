@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
-from itertools import accumulate
+from itertools import accumulate, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -93,7 +93,7 @@ def completed(table: RawTable) -> RawTable:
         table = table.named({0: (header.name, own)}) if header.role else table
     table = _with_numbered_channels(_with_lines_of_file(_without_shared_path(table)))
     table = _with_keyed_lines(_with_explained_names(table))
-    table = _with_titles(_with_heading_of_currents(table))
+    table = _with_titles(_with_currents_of_columns(_with_heading_of_currents(table)))
     table = _with_name_by_file(_with_listed_units(with_axis_as_time(table)))
     table = scales.with_stated_signs(_with_si_units(with_epoch(_with_clocks_and_weights(table))))
     return scales.with_sense(scales.with_scales(scales.with_counts(table)))
@@ -348,6 +348,25 @@ def _with_heading_of_currents(table: RawTable) -> RawTable:
     if len(headings) != 1:
         return table
     return replace(table, over=tuple(headings[0] if i in columns else "" for i in range(len(table.names))))
+
+
+def _with_currents_of_columns(table: RawTable) -> RawTable:
+    """Return forces with the current as title that lines state behind the name of each: F0 at 0 A, F1 at 0.5 A."""
+    columns, stated = table.columns("force"), dict[int, set[tuple[float, ...]]]()
+    if len(columns) < 2 or table.over:
+        return table
+    for line in table.lines:
+        names = {i: find_name(line, table.names[i]) or find_name(line, table.headers[i].name) for i in columns}
+        places = sorted((match.start(), i) for i, match in names.items() if match)
+        parts = [line[a:b] for (a, _), (b, _) in pairwise([*places, (len(line), 0)])]
+        before = line[: places[0][0]] if places else line  # 0 A: F0, 0.5 A: F1
+        for (_, i), part in zip(places, parts, strict=True) if not currents_in(before) else ():
+            stated.setdefault(i, set()).update({currents_in(part)} - {()})
+    currents = [of for i in columns for of in stated.get(i, ())]
+    if len({*currents}) != len(columns) or any(len(of) != 1 for of in (*currents, *stated.values())):
+        return table
+    titles = {i: f"{next(iter(of))[0]:g} A" for i, of in stated.items()}
+    return replace(table, over=tuple(titles.get(i, "") for i in range(len(table.names))))
 
 
 def _with_titles(table: RawTable) -> RawTable:

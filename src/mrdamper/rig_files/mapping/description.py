@@ -33,6 +33,7 @@ from mrdamper.rig_files.column_names import (
 )
 from mrdamper.rig_files.conditions import (
     OTHER_DEVICE,
+    currents_in,
     stated_by_lines,
     stated_in_titles,
     stated_motion,
@@ -89,12 +90,14 @@ _PLACES = ("column", "number", "index", "no", "position", "channel")  # of a col
 def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     """Add what short texts beside the file state of signs, and of names, units and scales where they lack."""
     lacking = bool(scales.scaled_columns(table)) or _lacks_names_or_units(table)
-    further = (f for f in path.parents[2:] if any(top == f or top in f.parents for top in READ_FOLDERS.get()))
-    folders = [_texts_in(f, f.stat().st_mtime_ns) for f in (path.parent, path.parent.parent, *further)]
+    # A text above the folders that are read may be that of another rig.
+    above = [f for f in path.parents[1:] if any(top == f or top in f.parents for top in READ_FOLDERS.get())]
+    folders = [_texts_in(f, f.stat().st_mtime_ns) for f in (path.parent, *above)]
     texts = next((readme for readme, *_ in folders if readme), [])
-    (readme, structures, listing), above = folders[:2]
-    structures = structures or above[1]
-    listing = listing if readme else [*listing, *above[2]]
+    readme, structures, listing = folders[0]
+    for _, its_structures, its_listing in folders[1:2]:
+        structures = structures or its_structures
+        listing = listing if readme else [*listing, *its_listing]
     texts = texts + (structures if lacking or len(structures) <= _FEW_FILES else [])
     texts = texts + [p for p in listing if lacking and p.stat().st_size <= _LARGEST_LIST]
     texts = [p for p in {*texts} if p.is_file() and p != path and not profile.leaves_out(*p.parts)]
@@ -102,12 +105,15 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     lines = [column_names.without_namespaces(line) for of in own if len(of) <= _MOST for line in of]
     names = {header.name.casefold() for header in table.headers}
     counts, of_file = partial(scales.counts_in, names=names), partial(said_of_file, name=path.name)
-    alike = [h.name for h in table.headers if h.role in SIGNED and len(table.columns(h.role)) > 1]
+    several = [i for i, h in enumerate(table.headers) if h.role in SIGNED and len(table.columns(h.role)) > 1]
+    alike = {name for i in several for name in (table.names[i], table.headers[i].name)}
     about = [scales.states_sign, counts, partial(column_names.units_in, names=names), of_file]
     about.append(lambda line: any(find_name(line, name) for name in alike))
     # A current may be that of one test, or an example.
+    of_columns = re.sub("[:=]", " ", "; ".join(line for line in lines if about[-1](line) and currents_in(line)))
     lines = [line for line in lines if not (stated_by_lines([line], ".") or stated_in_titles([line]))]
-    stated = [(lacking and _of_channels(line)) or line * any(tells(line) for tells in about) for line in lines]
+    stated = [of_columns] if len(currents_in(of_columns)) > 1 else []
+    stated += [(lacking and _of_channels(line)) or line * any(tells(line) for tells in about) for line in lines]
     force = profile.channel("force")
     stated += [f"force [{force.unit}]"] if force.unit and force.column is None else []  # heads columns 0 A, 0.5 A, ...
     timed = profile.file.sample_rate_Hz or profile.channel("time").unit
