@@ -463,17 +463,18 @@ def test_parts_before_one_that_cannot_be_used_are_no_test(tmp_path, damaged):
     assert all(f"goes on in a_0.5A_part{damaged}.csv, which cannot be used" in found for found in before)
 
 
-def test_the_rest_that_a_column_of_tests_numbers_zero_is_omitted_beside_them(tmp_path):
+@pytest.mark.parametrize(("numbers", "reasons"), [((0, 1, 2), {"bag_0": "it rests"}), ((0, 1, 0, 2), {})])
+def test_the_rest_that_a_column_of_tests_numbers_zero_is_omitted_beside_them(tmp_path, numbers, reasons):
     text, noise = (
         "time (s),test_id,disp (mm),force (N),current (A)\n",
         1e-4 * np.random.default_rng(0).normal(size=T.size),
     )
-    for part, number in enumerate((0, 1, 0, 2)):
+    for part, number in enumerate(numbers):
         x, f = (X, force(0.5 * number)) if number else (noise, 60 + noise)
         text += rows(T + 4.0 * part, np.full(T.size, number), x, f, np.full(T.size, 0.5 * number))
     (tmp_path / "bag.csv").write_text(text)
     result = import_files([tmp_path])
-    assert (result.refusals, currents(result.records), result.reasons) == ((), [0.5, 1.0], {"bag_0": "it rests"})
+    assert (result.refusals, currents(result.records), result.reasons) == ((), [0.5, 1.0], reasons)
 
 
 def test_a_session_is_cut_at_rests_at_steps_of_the_current_and_where_the_logger_was_off(tmp_path):

@@ -321,3 +321,29 @@ def test_tables_of_a_database_are_joined_by_their_numbers(tmp_path):
     (tmp_path / "samples.csv").write_text("\n".join(["run_id,channel_id,t_s,value", *rows[:-1], ""]))
     sizes = [record.time.size for record in import_files([tmp_path]).records]
     assert sizes == [*[T.size] * (len(CURRENTS) - 1), T.size - 1]  # the last sample is cut
+
+
+@pytest.mark.parametrize(
+    ("counter", "number", "profile", "noted"),
+    [
+        ("RecordNo", "", "", "Test"),
+        ("Measurement No.", "Uhrzeit", '[file]\nrun_column = "Test"', "Test"),
+        ("Run", "UTC Time", "", "Run"),
+        ("Datum", "Uhrzeit", '[file]\nleave_out = ["Datum"]', "Test"),
+    ],
+)  # a time of day is no clock of the column of tests behind it
+def test_numbers_of_tests_stand_beside_other_counters_and_clocks(tmp_path, counter, number, profile, noted):
+    """Rows that no test has, number 0, are left out though the damper moves in them."""
+    lines, at = [], 0
+    for test, amperes in ((0, 0.2), (1, 0.0), (0, 0.2), (2, 0.6), (0, 0.2)):
+        for x, f in zip(X, force(amperes), strict=True):
+            first = test if counter == "Run" else "12.11.2024" if counter == "Datum" else at
+            clock = f"{(datetime(2024, 11, 12, 9) + timedelta(milliseconds=4 * at)):%H:%M:%S},"
+            beside = 7 if counter == "Run" else test
+            lines.append(f"{first},{clock if number else ''}{beside},{4 * at},{x:.5f},{f:.3f},{1e3 * amperes:.0f}\n")
+            at += 1
+    head = f"{counter},{number and f'{number},'}Test,T_ms,Position_mm,Force_N,Current_mA\n"
+    (tmp_path / "shift.csv").write_text(head + "".join(lines))
+    expect(tmp_path, 0.0, 0.6, profile=profile)
+    findings = import_files([tmp_path], parse_profile(profile)).records[0].findings
+    assert [f.text for f in findings] == [f"the rows of '0' in {noted!r}, before and after the tests, are left out"]

@@ -332,11 +332,11 @@ def _set_points(table: RawTable, rows: slice) -> list[Statement]:
 def with_marks(records: Sequence[Record], table: RawTable, tests: Sequence[slice]) -> Sequence[Record]:
     """Return records with the currents of a column of marks, where each has one, and none but its folder's so far."""
     bare = [i for i, header in enumerate(table.headers) if header.role is None and not header.unit]
-    searched = table.words is not None and table.source.size <= _LARGEST_MARKED
+    searched = table.source.size <= _LARGEST_MARKED
     of_folder = [r.provenance.get("current_from", "").startswith(_FOLDER) for r in records]
     bare_records = [replace(r, current=None) if own else r for r, own in zip(records, of_folder, strict=True)]
     for column in bare if searched and all(r.current is None and not r.doubt for r in bare_records) else ():
-        words = table.words(column)  # type: ignore[misc]
+        words = table.words(column)
         labels = ["" if RATING.search(label) else label for label in words.labels[: _MOST_MARKS + 1]]
         stated = [of[0] if len(of := currents_in(label)) == 1 else None for label in labels]
         if len(labels) > _MOST_MARKS:

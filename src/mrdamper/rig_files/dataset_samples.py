@@ -62,7 +62,6 @@ def read_samples(folder: Path, *, trusted: bool = False) -> dict[str, Channels]:
 def _of_parquet(table: RawTable, path: Path) -> dict[str, Channels]:
     names = list(table.names)
     _require(names, path)
-    assert table.words is not None
     ids = table.words(names.index("run_id"))
     channels: Channels = {}
     for at, name in enumerate(names):

@@ -21,6 +21,7 @@ from mrdamper.rig_files.readers.base import Content, RawTable, Words
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED, Finding
 
 MOST_RUNS = 2000
+IDLE = re.compile("(?i)(?:^|_)(?:0|idle|pause|rest)$")  # of what a column numbers beside tests
 _FEWEST_ROWS = 5  # of a test, on average
 _MOST_LEVELS = 200  # currents of a column of texts that are looked at
 _SMALL = 32 * 2**20  # bytes of a file whose columns are kept together
@@ -41,10 +42,8 @@ def tests_of(table: RawTable, form: FileForm, stated: Mapping[str, str | int]) -
     """
     if form.blocks == "join" and form.run_column is None:
         return [table]
-    column = _run_column(table, form)
-    if column is not None:
-        parts = _by_run(table, column, stated=form.run_column is not None)
-        if parts:
+    for column in _run_columns(table, form):
+        if parts := _by_run(table, column, stated=form.run_column is not None):
             return parts
     return _with_stated(table, _groups(table, form) or _shared_motion(table, form), stated) or [table]
 
@@ -63,20 +62,17 @@ def _with_stated(table: RawTable, tests: list[RawTable], stated: Mapping[str, st
     return [test.noted(Finding("W_COLUMN", text)) for test in chosen] if others else chosen
 
 
-def _run_column(table: RawTable, form: FileForm) -> int | None:
-    wanted = form.run_column
-    if wanted is None:
-        words = [[word.casefold().rstrip("0123456789") for word in words_of(name[:60])] for name in table.names]
-        named = [i for i, of in enumerate(words) if _RUN_WORDS & {*of} and {*of} <= _RUN_WORDS | _NUMBER]
-        if table.words is None:
-            return None
-        named = [i for i in named if len(table.words(i).labels) > 1] if len(named) > 1 else named
-        if named:
-            return named[0]
-        stated = [(i, table.words(i).labels[:_MOST_LEVELS]) for i, cell in enumerate(table.odd) if currents_in(cell)]
-        stated = [i for i, labels in stated if all(len(currents_in(label)) == 1 for label in labels)]
-        return next((i for i in (*stated, *_texts(table)) if i in stated or _changes_with_time(table, i)), None)
-    return column_called(table, wanted, "runs", "run_column under [file]")
+def _run_columns(table: RawTable, form: FileForm) -> list[int]:
+    """Return the columns that may tell the tests of a table apart, the surest first, or that of a profile."""
+    if form.run_column is not None:
+        return [column_called(table, form.run_column, "runs", "run_column under [file]")]
+    words = [[word.casefold().rstrip("0123456789") for word in words_of(name[:60])] for name in table.names]
+    named = [i for i, of in enumerate(words) if _RUN_WORDS & {*of} and {*of} <= _RUN_WORDS | _NUMBER]
+    if named:
+        return named
+    stated = [(i, table.words(i).labels[:_MOST_LEVELS]) for i, cell in enumerate(table.odd) if currents_in(cell)]
+    stated = [i for i, labels in stated if all(len(currents_in(label)) == 1 for label in labels)]
+    return stated or [i for i in _texts(table) if _changes_with_time(table, i)]
 
 
 def _texts(table: RawTable) -> list[int]:
@@ -88,17 +84,16 @@ def _texts(table: RawTable) -> list[int]:
 def _changes_with_time(table: RawTable, column: int) -> bool:
     """Tell if a column of texts changes where the time starts again, and only there, and never to an earlier text."""
     times = table.columns("time")
-    values = table.try_read(*times) if len(times) == 1 and table.words is not None else None
-    if values is None or table.words is None:
+    values = table.try_read(*times) if len(times) == 1 else None
+    if values is None:
         return False
     words, starts = table.words(column), np.flatnonzero(np.diff(values[times[0]]) < 0)
     return 0 < starts.size == len(words.labels) - 1 and np.array_equal(starts, np.flatnonzero(np.diff(words.codes)))
 
 
 def _by_run(table: RawTable, column: int, *, stated: bool) -> list[RawTable]:
-    assert table.words is not None
     table = replace(table, words=cache(table.words))  # every test asks
-    words = table.words(column)  # type: ignore[misc]
+    words = table.words(column)
     codes, labels = words.codes, list(words.labels)
     merged = "" in labels and labels[0] != ""  # named in its first row only
     if merged:
@@ -111,9 +106,14 @@ def _by_run(table: RawTable, column: int, *, stated: bool) -> list[RawTable]:
     if len(runs) > MOST_RUNS:
         problem = f"{len(runs)} runs in column {table.names[column]!r}"
         raise table.source.refuse("E_BLOCKS", problem, f"at most {MOST_RUNS} a file")
+    tidy = [re.sub(r"^([0-9]+)[.,]0+$", r"\1", label.strip()) or "unnamed" for label in labels]
+    stretches = np.bincount(codes[np.diff(codes, prepend=-1) != 0], minlength=len(labels))
+    between = [c for c in runs if IDLE.search(tidy[c]) and stretches[c] > 1 == max(np.delete(stretches, c), default=0)]
+    if between and len(runs) > 1:
+        text = f"the rows of {tidy[between[0]]!r} in {table.names[column]!r}, before and after the tests, are left out"
+        table, runs = table.noted(Finding("W_TABLE", text)), [code for code in runs if code not in between]
     read = _remembered(table)
     others = [i for i in range(len(table.names)) if i != column]
-    tidy = [re.sub(r"^([0-9]+)[.,]0+$", r"\1", label.strip()) or "unnamed" for label in labels]
     return [_part(table, read, others, partial(_rows_of, codes, code), tidy[code], merged=merged) for code in runs]
 
 
@@ -161,7 +161,6 @@ def _part(
         return Content(values, None if content.lines is None else content.lines[inside], content.findings)
 
     def words(column: int) -> Words:
-        assert table.words is not None
         whole = table.words(columns[column])
         codes, places = np.unique(whole.codes[rows()], return_inverse=True)
         return Words(places, tuple(whole.labels[code] for code in codes))
@@ -169,7 +168,7 @@ def _part(
     cells = {line: _title_cells(line) for line in table.remarks}
     several = tuple(line for line, own in cells.items() if len({value for c in own for value in currents_in(c)}) > 1)
     name = "_".join(part for part in (table.label, label) if part)
-    return replace(table.picked(columns, part), titles=several, label=name, words=words if table.words else None)
+    return replace(table.picked(columns, part), titles=several, label=name, words=words)
 
 
 def _title_cells(line: str) -> list[str]:
@@ -378,7 +377,7 @@ def with_channels_as_columns(table: RawTable) -> RawTable:
     unit = [i for i, either in enumerate(names) if either & _UNIT][:1]
     if len(value) != 1 or len(channel) != 1:
         value, channel, unit = _by_content(table)
-    if table.words is None or len(value) != 1 or len(channel) != 1:
+    if len(value) != 1 or len(channel) != 1:
         return table
     words = table.words(channel[0])
     roles = {split_name(label).role: code for code, label in enumerate(words.labels)}
@@ -400,7 +399,7 @@ def with_channels_as_columns(table: RawTable) -> RawTable:
 def _by_content(table: RawTable) -> tuple[list[int], list[int], list[int]]:
     """Return the columns of values, channels and units by what stands in them, where no name of a column tells."""
     texts = [i for i, text in enumerate(table.odd) if text]
-    if table.words is None or not texts or {"displacement", "force"} & {header.channel for header in table.headers}:
+    if not texts or {"displacement", "force"} & {header.channel for header in table.headers}:
         return [], [], []
     labels = {i: table.words(i).labels[: _MOST_CHANNELS + 1] for i in texts}
     channels = [i for i in texts if len({split_name(label).role for label in labels[i]} & {*REQUIRED, *OPTIONAL}) > 1]
@@ -411,14 +410,12 @@ def _by_content(table: RawTable) -> tuple[list[int], list[int], list[int]]:
 
 def _pivoted(table: RawTable, value: int, others: list[int], channels: list[_Channel], base: np.ndarray) -> RawTable:
     """Return the channels as columns, those with other times than the force behind their own clock."""
-    of_table = table.words
-    assert of_table is not None
     column = cache(lambda i: table.read([i]).values[i])
     clocks = [i for i in others if table.headers[i].role == "time"]
     rows = [own for *_, own in channels]
     even = [own.size == base.size and all(np.allclose(column(i)[own], column(i)[base]) for i in clocks) for own in rows]
     apart = [channel for channel, same in zip(channels, even, strict=True) if not same]
-    tests = [i for i in others if i not in clocks and len(np.unique(of_table(i).codes[base])) > 1]
+    tests = [i for i in others if i not in clocks and len(np.unique(table.words(i).codes[base])) > 1]
     if apart and (len(clocks) != 1 or tests):
         problem = f"{apart[0][0]!r} has other times than the force"
         raise table.source.refuse("E_RASTER", problem, "export one column a channel")
@@ -428,7 +425,7 @@ def _pivoted(table: RawTable, value: int, others: list[int], channels: list[_Cha
         places += [(clocks[0], own, *places[0][2:]), (value, own, label, unit)]
 
     def words(i: int) -> Words:
-        layout = of_table(places[i][0])
+        layout = table.words(places[i][0])
         return Words(layout.codes[places[i][1]], layout.labels)
 
     def read(columns: Sequence[int]) -> Content:
@@ -440,7 +437,7 @@ def _pivoted(table: RawTable, value: int, others: list[int], channels: list[_Cha
 
 def _units(table: RawTable, words: Words, column: list[int]) -> list[str] | None:
     """Return the unit of every channel; None if a channel has two."""
-    if not column or table.words is None:
+    if not column:
         return [""] * len(words.labels)
     stated = table.words(column[0])
     pairs = np.unique(np.column_stack([words.codes, stated.codes]), axis=0)

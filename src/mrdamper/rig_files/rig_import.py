@@ -30,6 +30,7 @@ from mrdamper.rig_files.mapping.description import SHORT_TEXTS, is_description, 
 from mrdamper.rig_files.mapping.proposals import is_integrated
 from mrdamper.rig_files.mapping.result_tables import WITHIN
 from mrdamper.rig_files.mapping.results import Results
+from mrdamper.rig_files.parts import IDLE
 from mrdamper.rig_files.profile import Profile, profile_of
 from mrdamper.rig_files.quality import check_long_record
 from mrdamper.rig_files.quality.table import to_run
@@ -40,7 +41,6 @@ from mrdamper.rig_files.sequences import clock_goes_on, follows, goes_on, is_nex
 from mrdamper.rig_files.tests_table import NAME as TESTS
 from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests, names_tests
 
-_IDLE = re.compile("(?i)_(?:0|idle|pause|rest)$")  # of the tests that a column numbers
 _Tests = list[tuple[Path, Record]]
 _SomeTests = Sequence[tuple[Path, Record]]
 _AS_NOTES = "read for what it states of the columns"
@@ -254,7 +254,7 @@ class _Intake:
         """Check tests with what the table of tests says of them, or keep them until another file states the current."""
         runs = {row.run for row in (self._table.of_file(path) if self._table else ()) if row.file}
         as_listed = runs <= {"", *(record.id for record in records)}  # else by the numbers of a plan of tests
-        idle = [r for r in records if len(records) > 1 and _IDLE.search(r.id) and plans.rests(r)]
+        idle = [r for r in records if len(records) > 1 and IDLE.search(r.id) and plans.rests(r)]
         self.omitted |= {Path(record.id): "it rests" for record in idle}
         records = [record for record in records if record not in idle] or records
         for record in self._without_doubtful_points(path, records):

@@ -280,7 +280,7 @@ def _remarks(table: RawTable, profile: Profile, assigned: dict[str, Assigned]) -
     used = {entry.column for entry in assigned.values()}
     columns = [i for i, header in enumerate(table.headers) if header.dimension in _KEPT]
     sessions = [i for i, header in enumerate(table.headers) if header.name.casefold() == "session"]
-    session = table.words(sessions[0]).labels if table.words and len(sessions) == 1 else ()
+    session = table.words(sessions[0]).labels if len(sessions) == 1 else ()
     columns += sessions if len(session) == 1 else []
     columns += [0] if table.names[0].casefold().endswith((*KEYS["name"],)) else []  # TraceName, before the names
     ignored = [name for i, name in enumerate(table.names) if name and i not in used and i not in columns]

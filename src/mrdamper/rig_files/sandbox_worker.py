@@ -101,6 +101,5 @@ def _send_columns(replies: BinaryIO, table: RawTable, columns: list[int]) -> Non
 
 
 def _send_words(replies: BinaryIO, table: RawTable, column: int) -> None:
-    assert table.words is not None
     words = table.words(column)
     send(replies, {"size": words.codes.size, "labels": words.labels}, [words.codes.astype(np.float64)])

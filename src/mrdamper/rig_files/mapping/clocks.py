@@ -194,7 +194,7 @@ def _with_date(table: RawTable, clock: int) -> RawTable:
     """Return a clock that goes back at midnight, with the dates beside it."""
     dates = [i for i, name in enumerate(table.names) if name.strip().casefold() in _DATES]
     values = table.try_read(clock) if len(dates) == 1 and table.units[clock] == "s" else None
-    if values is None or table.words is None or not np.any(np.diff(values[clock]) < -_DAY_S / 2):
+    if values is None or not np.any(np.diff(values[clock]) < -_DAY_S / 2):
         return table
     words = table.words(dates[0])
     days = [entry[0] // 10**9 for label in words.labels if (entry := stamp(f"{label} 00:00:00")) is not None]

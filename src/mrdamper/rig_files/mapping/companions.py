@@ -170,7 +170,7 @@ def is_list(path: Path) -> bool:
     """Tell if a file holds only short tables without a time, or a displacement and a force: a plan, peak values."""
 
     def short(table: RawTable) -> bool:
-        rows = table.words(0).codes.size if table.words is not None else _FEWEST_ROWS
+        rows = table.words(0).codes.size
         roles = {header.role for header in table.headers}
         record = "time" in roles or {"displacement", "force"} <= roles
         return any(table.names) and rows < _FEWEST_ROWS and not record

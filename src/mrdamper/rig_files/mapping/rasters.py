@@ -13,8 +13,8 @@ from mrdamper.data import Floats, held_current
 from mrdamper.data.wording import number, span
 from mrdamper.rig_files.column_names import role_of, split_name
 from mrdamper.rig_files.readers.arrays import array_table
-from mrdamper.rig_files.readers.base import Content, RawTable
-from mrdamper.rig_files.record import OPTIONAL, REQUIRED, Finding
+from mrdamper.rig_files.readers.base import Content, RawTable, Words
+from mrdamper.rig_files.record import COARSE_CLOCK, OPTIONAL, REQUIRED, Finding
 
 _FEWEST_OVERLAP = 0.5  # of the force's time that every needed channel must cover
 _SAME = 1e-9  # [s]: clocks that differ by less are one
@@ -40,6 +40,9 @@ def with_one_clock(table: RawTable, stated: Mapping[str, str | int] = MappingPro
     }
     if not roles["force"] or not roles["displacement"]:
         return table
+    with_channel = {i for i, header in enumerate(table.headers) if header.role or header.dimension}
+    if len({owner[i] for i in owner if i in with_channel or {*called[i]} & {*stated.values()}}) < 2:
+        return _with_clocks_compared(table)  # nothing but counters and texts follows the others
     together = [c for c in groups if all(any(owner[i] == c for i in roles[r]) for r in ("displacement", "force"))]
     if len(together) > 1:
         return table  # groups that are tests
@@ -108,12 +111,16 @@ def _joined(label: str, tables: Sequence[RawTable], *, one_clock: bool) -> RawTa
     def apart(columns: Sequence[int]) -> Content:
         return Content({column: load(column) for column in columns})
 
+    def words(column: int) -> Words:
+        table, i = places[column]
+        return table.words(i)
+
     names, units = (tuple(getattr(table, key)[i] for table, i in places) for key in ("names", "units"))
     read = array_table(tables[0].source, names, units, load).read if one_clock else apart
     constants = {name: value for table in reversed(tables) for name, value in table.constants.items()}
     remarks = tuple(dict.fromkeys(line for table in tables for line in table.remarks))
     own = {"names": names, "units": units, "label": label, "constants": constants, "remarks": remarks}
-    return replace(tables[0], odd=(), over=(), read=read, words=None, **own)
+    return replace(tables[0], odd=(), over=(), read=read, words=words, **own)
 
 
 def _clocks(table: RawTable) -> dict[int, list[int]]:
@@ -167,13 +174,20 @@ def _resampled(
     def columns_of(columns: Sequence[int]) -> Content:
         return Content({i: on_clock(kept[i]) for i in columns})
 
+    def words(column: int) -> Words:
+        own, whole = owner.get(kept[column], kept[column]), table.words(kept[column])
+        rows, target = common()
+        latest = np.searchsorted(_filled(stamps(own)), target, side="right") - 1
+        return Words(whole.codes[rows if own == clock else np.maximum(latest, 0)], whole.labels)
+
     gaps = _apart(table, clock, [*{*owner.values()} - {clock}])
     apart = {other: gap for other, gap in gaps.items() if gap > _SAME}
     names = sorted({table.headers[i].name for own in roles.values() for i in own if owner[i] in apart})
     own, text = "on clocks of their own", f"interpolated onto the force's: {', '.join(names[:6])}"
     if max(apart.values(), default=np.inf) < np.inf:
         own += f", up to {number(1e3 * max(apart.values()))} ms apart"
-    resampled_table = table.picked(kept, columns_of).named({0: ("time", table.headers[clock].unit)})
+    columns_on_clock = replace(table.picked(kept, columns_of), words=words)
+    resampled_table = columns_on_clock.named({0: ("time", table.headers[clock].unit)})
     return resampled_table.noted(Finding("W_RASTER", f"{own}, {text}")) if names else resampled_table
 
 
@@ -191,7 +205,9 @@ def _with_clocks_compared(table: RawTable) -> RawTable:
     """Note a second clock of a table that starts a little earlier or later than the one that all channels follow."""
     clocks = table.columns("time", "time")
     apart = max(_apart(table, clocks[0], clocks[1:]).values()) if len(clocks) == 2 else 0.0
-    if not _SAME < apart < _TWO_STARTS:
+    if not _SAME < apart < _TWO_STARTS or any(
+        np.mean(np.diff(table.read([i]).values[i]) == 0) > COARSE_CLOCK for i in clocks
+    ):
         return table
     one, two = (table.headers[i].name for i in clocks)
     text = (

@@ -166,7 +166,7 @@ def results_among(tables: Sequence[RawTable]) -> tuple[Results | None, Sequence[
 
 def lines_of(table: RawTable) -> list[str]:
     """Return a small table as lines of text."""
-    if table.words is None or len(table.names) > _MOST_COLUMNS:
+    if len(table.names) > _MOST_COLUMNS:
         return []
     columns = [table.words(i) for i in range(len(table.names))]
     sizes = {words.codes.size for words in columns}

@@ -258,10 +258,10 @@ class Results:
 
     def column_of_tests(self, table: RawTable, *, with_rests: bool = False) -> str | None:
         """Return the column of a record that numbers tests, or rests between them, as one of its name here does."""
-        for i, name in enumerate(table.names if table.words is not None else ()):
+        for i, name in enumerate(table.names):
             own = _key(split_name(name).name)
             at = [k for k, key in enumerate(self.keys) if key and _key(split_name(key).name) == own]
-            if len(at) != 1 or table.words is None or table.headers[i].role == "time":
+            if len(at) != 1 or table.headers[i].role == "time":
                 continue
             numbers = {_key(label) for label in table.words(i).labels} - {""}
             rows = {_key(cells[at[0]]) for cells in (*self.cells, *self.pauses)}

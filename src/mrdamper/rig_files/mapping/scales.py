@@ -218,7 +218,7 @@ def with_sense(table: RawTable) -> RawTable:
     """Return a force recorded as a magnitude, with the sign that a column of two words beside it states."""
     forces = table.columns("force")
     senses = [i for i, name in enumerate(table.names) if name.strip().casefold() in _SENSE_NAMES]
-    if len(forces) != 1 or len(senses) != 1 or table.words is None:
+    if len(forces) != 1 or len(senses) != 1:
         return table
     words = table.words(senses[0])
     signs = [_sign_of(label, table.remarks) for label in words.labels]

@@ -87,7 +87,7 @@ def array_table(
         codes = {cell: code for code, cell in enumerate(dict.fromkeys(cells))}
         return base.Words(np.array([codes[cell] for cell in cells], dtype=np.int32), tuple(codes))
 
-    return base.RawTable(source, tuple(names), tuple(units), read, words=words)
+    return base.RawTable(source, tuple(names), tuple(units), read, words)
 
 
 def text_of(item: object) -> str:

@@ -124,6 +124,7 @@ class RawTable:
     names: tuple[str, ...]  # as the file has them; empty strings where it has none
     units: tuple[str, ...]  # from a row or property of their own; empty where there is none
     read: Callable[[Sequence[int]], Content]  # takes the positions of columns
+    words: Callable[[int], Words]  # takes the position of a column
     line: int | None = None  # of the header
     label: str = ""  # tells apart several tables of one file
     form: Mapping[str, str | int] = field(default_factory=dict)  # what was sniffed, in the words of `FileForm`
@@ -132,7 +133,6 @@ class RawTable:
     remarks: tuple[str, ...] = ()  # what the file says beside the columns: lines above them, attributes, properties
     over: tuple[str, ...] = ()  # where a row of titles stands above the names of columns
     titles: tuple[str, ...] = ()  # of `remarks` those that are titles of several tests
-    words: Callable[[int], Words] | None = None  # takes the position of a column
     findings: tuple[Finding, ...] = ()  # what was decided on the way from the file to this table
     # of displacement and force where a text states them: 1, -1 if compression is positive, 0 if the text is unclear
     senses: Mapping[str, int] = field(default_factory=dict)
@@ -201,7 +201,7 @@ class RawTable:
         return replace(self, names=tuple(name for name, _ in both), units=tuple(unit for _, unit in both))
 
     def picked(self, columns: Sequence[int], read: Callable[[Sequence[int]], Content]) -> RawTable:
-        """Return some of the columns, in this order, with another way to read them; without titles and words."""
+        """Return some of the columns, in this order, with another way to read them, without titles."""
 
         def pick(entries: tuple[str, ...]) -> tuple[str, ...]:
             return tuple(entries[i] for i in columns) if entries else ()
@@ -209,7 +209,7 @@ class RawTable:
         odd, numbers = pick(self.odd), tuple(map(self.number, columns))
         repeated = self.repeated | {name for name, count in Counter(self.names).items() if count > 1}
         own = {"names": pick(self.names), "units": pick(self.units), "odd": odd, "over": (), "numbers": numbers}
-        return replace(self, words=None, read=read, repeated=repeated, **own)
+        return replace(self, words=lambda i: self.words(columns[i]), read=read, repeated=repeated, **own)
 
     def computed(self, column: int, needs: Sequence[int], make: Callable[[Mapping[int, Floats]], Floats]) -> RawTable:
         """Return the table with a column made of the values of others, of its own among them; the next one is added."""
@@ -226,7 +226,7 @@ class RawTable:
             return replace(self, read=read)
         wider = {key: (*old, "") for key in ("names", "units", "odd", "over") if (old := getattr(self, key))}
         numbers = (*self.numbers, 0) if self.numbers else ()  # that no profile gives
-        return replace(self, read=read, words=None, numbers=numbers, **wider)
+        return replace(self, read=read, numbers=numbers, **wider)
 
 
 class Reader(ABC):

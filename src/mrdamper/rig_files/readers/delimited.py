@@ -84,6 +84,7 @@ class DelimitedText(Reader):
             layout.names,
             units,
             lambda columns: _read(stream, layout, block, tuple(dict.fromkeys(columns))),
+            lambda column: _words(stream, layout, block, column),
             layout.header_line,
             f"block {index + 1}" if count > 1 else "",
             form,
@@ -91,7 +92,6 @@ class DelimitedText(Reader):
             remarks=block.remarks or layout.remarks,
             over=layout.over,
             numbers=tuple(range(before + 1, before + len(units) + 1)) if (before := stream.source.before) else (),
-            words=lambda column: _words(stream, layout, block, column),
         )
 
 
