@@ -4,7 +4,7 @@ VENV   ?= .venv
 BIN    := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help study serve test coverage test-all bench bench-check fuzz attack mutants lint format docs release-check clean
+.PHONY: help study serve test coverage bench bench-check fuzz attack mutants lint format docs release-check clean
 
 help:  ## show this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -15,14 +15,12 @@ study: $(VENV)/.core  ## set up the core and run the whole method on the bundled
 serve: $(VENV)/.web  ## set up and open the app
 	$(BIN)/mrdamper serve
 
-test: $(VENV)/.dev  ## set up and run the tests
-	$(BIN)/python -m pytest -m "not slow" -n 2
+TESTS ?= not slow
+test: $(VENV)/.dev  ## set up and run the tests (TESTS= runs the slow ones too)
+	$(BIN)/python -m pytest -m "$(TESTS)" -n 2
 
 coverage: $(VENV)/.dev  ## the fast tests with the share of lines they reach
 	$(BIN)/python -m pytest -m "not slow" -n 2 --cov=mrdamper --cov-report=term:skip-covered --cov-report=xml
-
-test-all: $(VENV)/.dev  ## the tests, slow ones too
-	$(BIN)/python -m pytest -n 2
 
 bench: $(VENV)/.dev  ## timings beside the peers that are installed
 	$(BIN)/python -m benchmarks
