@@ -1,4 +1,4 @@
-"""A seeded tenth of the joint part of `benchmarks/coverage.py`."""
+"""A seeded part of the joint part of `benchmarks/coverage.py`."""
 
 import sys
 from pathlib import Path
@@ -10,7 +10,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from benchmarks.coverage import jointly
 from benchmarks.synthetic_coverage import FAMILIES, covered
 
-LEVEL, REPEATS = 0.95, 50
+LEVEL, REPEATS = 0.95, 30
 
 
 def least(share):
