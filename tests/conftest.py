@@ -44,7 +44,7 @@ GROUPS = {
     "study": (
         "report/test_pictures.py", "report/test_summary.py", "study/test_workflow.py",
         "study/test_contradictions.py::test_no_run_of_a_bundled", "test_docs.py::test_the_", "test_examples.py",
-        "test_numbers.py",
+        "test_numbers.py", "test_public_names.py",
     ),
     "fleet": ("fleet/",),
     "fmu": ("export/test_fmu",),

@@ -62,7 +62,7 @@ def test_a_name_that_does_not_exist_is_an_attribute_error():
         importlib.import_module("mrdamper.workflows")
 
 
-@pytest.mark.slow  # runs a whole study
+@pytest.mark.usefixtures("studied_once")
 def test_the_example_of_the_package_runs():
     failures, tried = doctest.testmod(mrdamper)
     assert tried >= 4

@@ -93,5 +93,7 @@ def test_fleet(few_runs, tmp_path):
 
 
 @pytest.mark.slow
-def test_compare_of_every_model_of_the_bundled_tests(tmp_path):
-    assert len(lines_of("compare", "--out", tmp_path / "c", "--jobs", 1)) <= MAX_LINES
+def test_compare_of_every_model_of_two_rigs(bundled, tmp_path):
+    sines = [[run for run in bundled.rig(rig) if run.excitation == "sine"] for rig in bundled.rigs]
+    save_dataset(bundled.only([run for runs in sines for run in runs[::4]], name="two rigs"), tmp_path / "rigs")
+    assert len(lines_of("compare", tmp_path / "rigs", "--out", tmp_path / "c", "--jobs", 1)) <= MAX_LINES

@@ -52,7 +52,7 @@ def expected(damper, rows):
 
 @pytest.mark.parametrize(
     ("name", "conditions", "steps"),
-    [*((name, 4, 1000) for name in KINDS), *(pytest.param(name, 20, 4000, marks=pytest.mark.slow) for name in DAMPERS)],
+    [*((name, 4, 1000) for name in KINDS), *(pytest.param(name, 8, 4000, marks=pytest.mark.slow) for name in DAMPERS)],
 )
 def test_c_equals_python_to_the_last_bit(name, conditions, steps, tmp_path):
     rows = many_conditions(conditions, steps)

@@ -139,7 +139,7 @@ def test_false_alarms_are_rare():
 
 @pytest.mark.slow
 def test_planted_faults_are_found_and_named(tmp_path):
-    line = Population(dampers=80, sessions=4, golden=1, faults=dict.fromkeys(FAULTS, 3), seed=11)
+    line = Population(dampers=60, sessions=4, golden=1, faults=dict.fromkeys(FAULTS, 3), seed=11)
     write_fleet(line, tmp_path / "records")
     found = run_fleet(tmp_path / "records", tmp_path / "out", workers=2)
     table = with_features(pl.read_parquet(found.table)).filter(~pl.col("golden"))
@@ -147,7 +147,7 @@ def test_planted_faults_are_found_and_named(tmp_path):
     truth = {d.serial: d.fault for d in line if not d.golden}
     faulty = {serial for serial, fault in truth.items() if fault}
     assert len(faulty & set(named)) >= 0.95 * len(faulty)
-    assert len(set(named) - faulty) <= 0.01 * 80
+    assert not set(named) - faulty
     words = {"low gas": "gas", "air in oil": "air", "worn seal": "seal", "wrong coil": "coil"}
     assert sum(words[truth[s]] in named[s] for s in faulty & set(named)) >= 0.9 * len(faulty)
 

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from support.command import EACH, mrdamper
 
+from mrdamper.rig_files.dataset_folder import save_dataset
+
 PARTS = Path(__file__).parents[1] / "drop_in"
 GROUPS = {
     "models": "models",
@@ -197,9 +199,11 @@ def test_an_outside_model_is_identified_saved_loaded_and_exported(environment, t
 
 
 @pytest.mark.slow
-def test_an_outside_model_is_studied(environment, tmp_path):
-    run(environment, ("study", "--model", "rounded-coulomb", "--out", tmp_path / "result"))
-    saved = json.loads((tmp_path / "result" / "model-utfsm.json").read_text())
+def test_an_outside_model_is_studied(environment, tmp_path, bundled):
+    runs = [run for run in bundled.rig("utfsm") if run.excitation == "sine"]
+    save_dataset(bundled.only(runs[:8], name="few runs"), tmp_path / "rig")
+    run(environment, ("study", tmp_path / "rig", "--model", "rounded-coulomb", "--out", tmp_path / "result"))
+    saved = json.loads((tmp_path / "result" / "model.json").read_text())
     assert saved["damper"]["model"] == "rounded-coulomb"
 
 
