@@ -18,7 +18,7 @@ from mrdamper.rig_files.profile_template import profile_template
 from mrdamper.rig_files.readers.arrays import unit_in
 from mrdamper.rig_files.rig_import import found_tests, import_files, read_run, read_runs
 
-T = np.arange(0.0, 4.0, 0.005)
+T = np.arange(0.0, 4.0, 0.01)
 V = np.cos(2 * np.pi * T)
 X = 10 * np.sin(2 * np.pi * T)  # [mm]
 
@@ -112,7 +112,7 @@ def test_channels_in_rows_are_turned(behind, tmp_path):
 
 def test_an_xml_file_beside_a_record_names_columns_rate_and_current(tmp_path):
     (tmp_path / "data.csv").write_text(rows(X, force(0.5) / 1e3))
-    meta = """<test><samplingRate unit="Hz">200</samplingRate><coilCurrent unit="A">0.5</coilCurrent>
+    meta = """<test><samplingRate unit="Hz">100</samplingRate><coilCurrent unit="A">0.5</coilCurrent>
     <channel column="2" name="Force" unit="kN"/><channel column="1" name="Displacement" unit="mm"/></test>"""
     (tmp_path / "meta.xml").write_text(meta)
     (record,) = import_files([tmp_path]).records
@@ -441,19 +441,19 @@ def test_rests_between_the_numbered_tests_have_no_row_in_a_plan_and_motions_with
 
 @pytest.mark.parametrize("gap", [0.0, 9.0])
 def test_parts_of_a_record_without_the_heading_of_the_first_go_on_by_their_clock(tmp_path, gap):
-    for part, inside in enumerate((slice(0, 300), slice(300, 600), slice(600, None)), 1):
+    for part, inside in enumerate((slice(0, 150), slice(150, 300), slice(300, None)), 1):
         head = "Tempo (s),Deslocamento (mm),Força (N)\n" if part == 1 else ""
         table = rows(T[inside] + gap * part, X[inside], force(0.5)[inside])
         (tmp_path / f"E_0.5A_parte{part}.txt").write_text(head + table, encoding="utf-8")
     result = import_files([tmp_path])
-    assert [(r.id, r.time.size) for r in result.records] == ([("E_0.5A_parte1", 300)] if gap else [("E_0.5A", T.size)])
+    assert [(r.id, r.time.size) for r in result.records] == ([("E_0.5A_parte1", 150)] if gap else [("E_0.5A", T.size)])
     assert currents(result.records) == [0.5]
     assert [refusal.error.code for refusal in result.refusals] == ["E_UNITS_MISSING"] * (2 if gap else 0)
 
 
 @pytest.mark.parametrize("damaged", [2, 3])
 def test_parts_before_one_that_cannot_be_used_are_no_test(tmp_path, damaged):
-    for part, inside in enumerate((slice(0, 300), slice(300, 600), slice(600, None)), 1):
+    for part, inside in enumerate((slice(0, 150), slice(150, 300), slice(300, None)), 1):
         table = rows(T[inside], X[inside], force(0.5)[inside])
         table = table[:-1] + "x\n" if part == damaged else table
         (tmp_path / f"a_0.5A_part{part}.csv").write_text("Time (s),Displacement (mm),Force (N)\n" + table)
@@ -497,7 +497,7 @@ def test_a_session_is_cut_at_rests_at_steps_of_the_current_and_where_the_logger_
 
 def test_a_sheet_of_the_plan_states_the_rate_and_a_sheet_of_quantities_the_share_of_a_current(tmp_path):
     book = pytest.importorskip("openpyxl").Workbook()
-    for row in (["Test series"], ["Sampling rate:", 200, "Hz"], [], ["TN số", "Dòng điện (A)"], [1, 0], [2, 0.5]):
+    for row in (["Test series"], ["Sampling rate:", 100, "Hz"], [], ["TN số", "Dòng điện (A)"], [1, 0], [2, 0.5]):
         book.active.append(row)
     sheet = book.create_sheet("Data")
     sheet.append(["TN số", "Mẫu số", "Chuyển vị (mm)", "Lực (N)"])
@@ -711,10 +711,10 @@ def test_channels_of_other_lengths_in_one_group_are_no_table_of_results(tmp_path
 @pytest.mark.parametrize(
     ("heading", "codes"),
     [
-        ("Sample rate: 800 Hz\nFrequency: 4 Hz\n", ["E_AMBIGUOUS"]),
-        ("Sample rate: 800 Hz\n", ["E_AMBIGUOUS"]),
-        ("Sample rate: 800 Hz\nFrequency: 1 Hz\n", []),  # every fourth sample was exported
-        ("Sample rate: 200 Hz\n", []),
+        ("Sample rate: 400 Hz\nFrequency: 4 Hz\n", ["E_AMBIGUOUS"]),
+        ("Sample rate: 400 Hz\n", ["E_AMBIGUOUS"]),
+        ("Sample rate: 400 Hz\nFrequency: 1 Hz\n", []),  # every fourth sample was exported
+        ("Sample rate: 100 Hz\n", []),
     ],
 )
 def test_a_stated_rate_that_contradicts_the_time_column_is_refused(tmp_path, heading, codes):
@@ -723,7 +723,7 @@ def test_a_stated_rate_that_contradicts_the_time_column_is_refused(tmp_path, hea
     assert [r.error.code for r in import_files([path]).refusals] == codes
     by_column = import_files([path], parse_profile('[channels.time]\ncolumn = "Time [s]"\n'))
     assert [r.error.code for r in by_column.refusals] == (codes if "4 Hz" in heading else [])
-    by_rate = import_files([path], parse_profile("[file]\nsample_rate_Hz = 800\n"))
+    by_rate = import_files([path], parse_profile("[file]\nsample_rate_Hz = 400\n"))
     assert [r.error.code for r in by_rate.refusals] == ["E_MOTION_CONTRADICTS"] * ("1 Hz" in heading)
 
 
@@ -829,9 +829,9 @@ def test_a_profile_joins_files_of_one_name_in_a_folder_for_each_test(tmp_path):
 
 
 @pytest.mark.parametrize("mark", [";", "#"])
-@pytest.mark.parametrize("rate", ["", "sample_rate_Hz = 200.0\n"])
+@pytest.mark.parametrize("rate", ["", "sample_rate_Hz = 100.0\n"])
 def test_a_profile_joins_files_of_one_channel_each_by_the_rate_that_it_or_they_state(tmp_path, mark, rate):
-    head = "" if rate else f"{mark} Sample rate: 200 Hz\n"
+    head = "" if rate else f"{mark} Sample rate: 100 Hz\n"
     for run in ("a", "b"):
         for name, values in (("ch1", X / 5), ("ch2", force(0.5))):
             text = f"{mark} Unit: V\n{head}{mark} Samples: {T.size}\n{rows(values)}"
@@ -1580,14 +1580,14 @@ def test_a_plan_of_the_ranges_of_one_record_gives_each_test_the_current_of_its_r
     [
         (
             "plan.csv",
-            "File,Start row,End row,Current (A)\nrun_1.csv,1,500,0.25\nrun_2.csv,1,800,0.5\n",
+            "File,Start row,End row,Current (A)\nrun_1.csv,1,250,0.25\nrun_2.csv,1,400,0.5\n",
             HEAD,
-            [500, 800],
+            [250, 400],
         ),
-        ("plan.csv", "Test,Start (s),End (s),Current (A)\n1,1,3,0.25\n2,1,4,0.5\n", HEAD, [401, 600]),
-        ("plan.csv", "Test,Start (s),End (s)\n1,1,3\n2,1,4\n", "# coil current: {} A\n" + HEAD, [401, 600]),
-        ("plan.csv", "Test,Start (s),End (s),Current (A)\n1,1,3,0.25\n2,11,13,0.5\n", HEAD, [800, 800]),
-        ("tests.csv", "file,current_A,start_s,end_s\nrun_1.csv,0.25,1,3\nrun_2.csv,0.5,1,4\n", HEAD, [401, 600]),
+        ("plan.csv", "Test,Start (s),End (s),Current (A)\n1,1,3,0.25\n2,1,4,0.5\n", HEAD, [201, 300]),
+        ("plan.csv", "Test,Start (s),End (s)\n1,1,3\n2,1,4\n", "# coil current: {} A\n" + HEAD, [201, 300]),
+        ("plan.csv", "Test,Start (s),End (s),Current (A)\n1,1,3,0.25\n2,11,13,0.5\n", HEAD, [400, 400]),
+        ("tests.csv", "file,current_A,start_s,end_s\nrun_1.csv,0.25,1,3\nrun_2.csv,0.5,1,4\n", HEAD, [201, 300]),
     ],
 )
 def test_each_test_is_cut_to_its_start_and_end_in_a_plan_if_they_are_on_its_own_clock(
@@ -1850,7 +1850,7 @@ def test_names_and_units_in_persian_and_a_rate_in_russian_are_read(tmp_path):
 @pytest.mark.parametrize(("heads", "count"), [(("1Hz", "2Hz"), 2), (("A", "B"), 0)])
 def test_groups_of_columns_named_after_motions_are_tests_though_they_share_the_time(tmp_path, heads, count):
     slow = np.column_stack([T, X, force(0.5), 10 * np.sin(4 * np.pi * T), force(0.5)])
-    slow[:, 4] = 300 * np.tanh(6 * np.cos(4 * np.pi * T)) + 100 * np.cos(4 * np.pi * T)
+    slow[:, 4] = motion(2.0, 0.5, 1)[1]
     line = "Time (s)," + ",".join(f"Disp_{head} (mm),Force_{head} (N)" for head in heads)
     (tmp_path / "b_0.5A.csv").write_text(f"{line}\n{rows(*slow.T)}")
     assert len(import_files([tmp_path]).records) == count

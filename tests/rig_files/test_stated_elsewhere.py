@@ -15,7 +15,7 @@ from mrdamper.rig_files.profile import parse_profile
 from mrdamper.rig_files.rig_import import found_tests, import_files
 from mrdamper.rig_files.rig_record import recording_time
 
-T = np.arange(0.0, 3.0, 0.002)
+T = np.arange(0.0, 3.0, 0.005)
 X = 10 * np.sin(2 * np.pi * T + 0.3)  # [mm]
 
 
@@ -201,12 +201,12 @@ def test_samples_are_counted_where_the_clock_repeats_itself_and_the_rate_is_stat
     rows = [f"{t},{x:.4f},{f:.3f}" for t, x, f in zip(coarse, X, force(0.5), strict=True)]
     head = f"{name},Displacement [mm],Force [N]\n"
     path = tmp_path / "a_0.5A.csv"
-    path.write_text("Sample rate: 500 Hz\n" + head + "\n".join(rows))
+    path.write_text("Sample rate: 200 Hz\n" + head + "\n".join(rows))
     expect(tmp_path, 0.5)
     path.write_text(head + "\n".join(rows))
     (refusal,) = import_files([tmp_path]).refusals
     assert (refusal.error.code, "sample_rate_Hz" in refusal.error.remedy) == ("E_TIME_DUPLICATE", True)
-    assert len(import_files([tmp_path], parse_profile("[file]\nsample_rate_Hz = 500\n")).records) == 1
+    assert len(import_files([tmp_path], parse_profile("[file]\nsample_rate_Hz = 200\n")).records) == 1
 
 
 def test_a_text_of_the_same_name_states_the_current_of_its_record(tmp_path):
@@ -373,7 +373,7 @@ def test_minutes_of_one_digit_are_a_clock(tmp_path):
 def test_a_clock_named_after_each_channel_is_the_time_of_that_channel(tmp_path):
     channels = {"Force_N": force(0.5), "Stroke_mm": X, "Current_A": np.full(T.shape, 0.5)}
     clocks = {f"time_{name}": T for name in channels}
-    savemat(tmp_path / "a.mat", {**channels, **clocks, "Sample_rate": 500.0, "Start_time": "2023-04-12 09:11:00"})
+    savemat(tmp_path / "a.mat", {**channels, **clocks, "Sample_rate": 200.0, "Start_time": "2023-04-12 09:11:00"})
     expect(tmp_path, 0.5)
 
 
@@ -387,7 +387,7 @@ def test_rows_of_tables_beside_a_vector_of_currents_are_tests(tmp_path):
 @pytest.mark.parametrize("text", ["columns: time [s], displacement [mm], force [N]", ""])
 def test_matrices_whose_names_tell_no_channel_are_tests(tmp_path, text):
     tests = {
-        f"I{i}A".replace(".", "p"): np.column_stack([T, X, force(i)])[: 1400 + 50 * n] for n, i in enumerate((0.0, 0.5))
+        f"I{i}A".replace(".", "p"): np.column_stack([T, X, force(i)])[: 550 + 25 * n] for n, i in enumerate((0.0, 0.5))
     }
     savemat(tmp_path / "all.mat", {**tests, "info": text})
     stated = "".join(
@@ -395,7 +395,7 @@ def test_matrices_whose_names_tell_no_channel_are_tests(tmp_path, text):
         for i, (role, unit) in enumerate({"time": "s", "displacement": "mm", "force": "N"}.items(), 1)
     )
     found = import_files([tmp_path], None if text else parse_profile(stated))
-    assert [(record.current[0], record.time.size) for record in found.records] == [(0.0, 1400), (0.5, 1450)]
+    assert [(record.current[0], record.time.size) for record in found.records] == [(0.0, 550), (0.5, 575)]
 
 
 def test_a_current_in_the_first_row_of_each_test_is_that_of_its_other_rows(tmp_path):
@@ -425,7 +425,7 @@ def test_arrays_over_two_conditions_have_their_samples_along_any_dimension(tmp_p
 def test_tests_of_different_lengths_in_one_array_are_cut_where_they_end(tmp_path, cube):
     tests = np.full((3, 3, T.size), np.nan)
     for n, current in enumerate((0.0, 0.5, 1.0)):
-        stop = T.size - 250 * n
+        stop = T.size - 100 * n
         tests[n, :, :stop] = np.array([T, X, force(current)])[:, :stop]
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["current_A"] = [0.0, 0.5, 1.0]
@@ -436,7 +436,7 @@ def test_tests_of_different_lengths_in_one_array_are_cut_where_they_end(tmp_path
             for name, values in zip(("time_s", "disp_mm", "force_N"), np.swapaxes(tests, 0, 1), strict=True):
                 file[name] = values
     expect(tmp_path, 0.0, 0.5, 1.0)
-    assert [r.time.size for r in import_files([tmp_path]).records] == [T.size, T.size - 250, T.size - 500]
+    assert [r.time.size for r in import_files([tmp_path]).records] == [T.size, T.size - 100, T.size - 200]
 
 
 def cells_with_headings(path, rows):
@@ -589,7 +589,7 @@ def test_a_recorded_velocity_is_integrated_and_said(tmp_path):
 @pytest.mark.parametrize("zero", [0.0, 0.02, -0.1])
 def test_the_zero_of_a_transducer_of_velocity_is_no_drift(zero):
     slope = 2 * np.pi * 0.01 * np.cos(2 * np.pi * T + 0.3) + zero
-    np.testing.assert_allclose(displacement_of(T, slope), X / 1000, atol=1.2e-4)  # one step of 0.002 s at 0.06 m/s
+    np.testing.assert_allclose(displacement_of(T, slope), X / 1000, atol=1.2e-4)  # two fifths of a step at 0.06 m/s
 
 
 def test_a_velocity_under_one_cycle_has_no_stated_position():
@@ -811,10 +811,10 @@ def test_the_day_of_a_test_is_that_of_its_own_lines(tmp_path, lines, note):
 @pytest.mark.parametrize(
     ("head", "scale"),
     [
-        (['"Sample Rate","500.000","Hz","","Duration","3.000","s"', "Time [s],Displacement [mm],Force [N]"], 1),
-        (["Sampling frequency: 500 Hz", "Time,Displacement [mm],Force [N]"], 1e3),
+        (['"Sample Rate","200.000","Hz","","Duration","3.000","s"', "Time [s],Displacement [mm],Force [N]"], 1),
+        (["Sampling frequency: 200 Hz", "Time,Displacement [mm],Force [N]"], 1e3),
         (["Time [s],Stroke (in.),Force [N]"], 1),
-        (["Logger 0.7, 500 SPS", "format: millis,displacement_mm,force_N"], 1e3),
+        (["Logger 0.7, 200 SPS", "format: millis,displacement_mm,force_N"], 1e3),
         (["Var1,Var2,Var3"], 1),
     ],
     ids=[
@@ -893,7 +893,7 @@ def test_rows_of_arrays_with_units_of_their_own_are_tests(tmp_path):
 
 @pytest.mark.parametrize("name", ["Time of day", "Uhrzeit"])
 def test_a_time_of_day_and_a_current_in_wide_letters_are_read(name, tmp_path):
-    rows = [f"11:59:{58 + t:06.3f} AM,{x:.4f},{f:.3f}" for t, x, f in zip(T[:900], X, force(0.5), strict=False)]
+    rows = [f"11:59:{58 + t:06.3f} AM,{x:.4f},{f:.3f}" for t, x, f in zip(T[:360], X, force(0.5), strict=False)]
     (tmp_path / "\uff10\uff0e\uff15\uff21.csv").write_text("\n".join([f"{name},Displacement [mm],Force [N]", *rows]))
     expect(tmp_path, 0.5)
 
@@ -906,7 +906,7 @@ def test_lists_in_a_json_file_name_columns_that_a_row_of_numbers_heads(tmp_path)
 
 
 def test_numbered_keys_may_begin_with_the_channel(tmp_path):
-    head = ["Ch1Name=Displacement", "Ch1Unit=mm", "Ch2Name=Load", "Ch2Unit=N", "SampleRate=500 Hz"]
+    head = ["Ch1Name=Displacement", "Ch1Unit=mm", "Ch2Name=Load", "Ch2Unit=N", "SampleRate=200 Hz"]
     table(tmp_path / "a_0.5A.dat", head, X, force(0.5))
     expect(tmp_path, 0.5)
 
@@ -983,7 +983,7 @@ def test_no_current_is_offered_by_another_resistance_or_voltage_or_above_those_o
 def test_a_label_alone_on_its_line_states_what_the_next_holds(tmp_path):
     """As SignalExpress exports: a step for each column, in seconds, and names of terminals that a text explains."""
     head = ["channel names: ", "0_Voltage - Dev1_ai0\t0_Voltage - Dev1_ai1\t", "start times: "]
-    head += ["01/09/2016 15:01:22.331\t01/09/2016 15:01:22.331\t", "dt: ", "0.002\t0.002\t", "data: "]
+    head += ["01/09/2016 15:01:22.331\t01/09/2016 15:01:22.331\t", "dt: ", "0.005\t0.005\t", "data: "]
     body = [f"{x / 5:.6f}\t{f / 500:.6f}\t" for x, f in zip(X, force(0.5), strict=True)]
     (tmp_path / "run1.txt").write_text("\n".join([*head, *body, ""]))
     note = tmp_path / "README.txt"
