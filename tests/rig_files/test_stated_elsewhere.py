@@ -278,7 +278,7 @@ def test_rows_in_another_order_than_the_tests_are_refused_where_their_peak_force
     [
         ("Fuse: 10 A", "'Fuse: 10 A' (of a limit, a supply or another device)"),
         ("monitor: 1 A per V", "'monitor: 1 A per V' (a scale)"),
-        ("Tests at 0.5 A and 1 A", "'Tests at 0.5 A and 1 A' (one of several)"),
+        ("Tests at 0.5 A and 1 A", "'Tests at 0.5 A and 1 A' (one of several: 0.5 A and 1 A)"),
         ("", "column 'I_set [A]' (a command, or one of several)"),
     ],
 )
@@ -829,6 +829,8 @@ def test_names_and_units_are_read_as_a_careful_reader_does(head, scale, tmp_path
     folder.mkdir()
     table(folder / "a.csv", head, scale * T, X / (25.4 if "in." in head[0] else 1), force(0.5))
     expect(tmp_path, 0.5)
+    told = "".join(finding.text for finding in import_files([folder]).records[0].findings)
+    assert ("README.txt in the folder above is read" in told) == ("Var1" in head[0])
 
 
 def test_the_sense_in_a_table_of_columns_is_no_channel(tmp_path):

@@ -298,7 +298,8 @@ def why_not_taken(text: str) -> str:
         return ""
     if column_names.RATING.search(text) or _LABELLED_RATING.search(text):
         return "of a limit, a supply or another device"
-    return "a scale" if _SCALE.search(text) else "explains names" if EXPLAINED.search(text) else "one of several"
+    several = f"one of several: {' and '.join(f'{current:g} A' for current in currents_in(text))}"
+    return "a scale" if _SCALE.search(text) else "explains names" if EXPLAINED.search(text) else several
 
 
 def series_in(line: str) -> tuple[float, ...]:

@@ -90,15 +90,16 @@ _PLACES = ("column", "number", "index", "no", "position", "channel")  # of a col
 def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     """Add what short texts beside the file state of signs, and of names, units and scales where they lack."""
     lacking = bool(scales.scaled_columns(table)) or _lacks_names_or_units(table)
-    # A text above the folders that are read may be that of another rig.
+    # A text above the folders that are read may be that of another rig, unless it is called as one on all of them.
     above = [f for f in path.parents[1:] if any(top == f or top in f.parents for top in READ_FOLDERS.get())]
     folders = [_texts_in(f, f.stat().st_mtime_ns) for f in (path.parent, *above)]
     texts = next((readme for readme, *_ in folders if readme), [])
+    outer = [] if texts or above else _texts_in(top := path.parent.parent, top.stat().st_mtime_ns)[0]
     readme, structures, listing = folders[0]
     for _, its_structures, its_listing in folders[1:2]:
         structures = structures or its_structures
         listing = listing if readme else [*listing, *its_listing]
-    texts = texts + (structures if lacking or len(structures) <= _FEW_FILES else [])
+    texts = texts + outer + (structures if lacking or len(structures) <= _FEW_FILES else [])
     texts = texts + [p for p in listing if lacking and p.stat().st_size <= _LARGEST_LIST]
     texts = [p for p in {*texts} if p.is_file() and p != path and not profile.leaves_out(*p.parts)]
     own = (short_lines(text) for text in sorted(texts))
@@ -114,6 +115,10 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     lines = [line for line in lines if not (stated_by_lines([line], ".") or stated_in_titles([line]))]
     stated = [of_columns] if len(currents_in(of_columns)) > 1 else []
     stated += [(lacking and _of_channels(line)) or line * any(tells(line) for tells in about) for line in lines]
+    for text in outer[:1] if any(stated) else ():
+        table = table.noted(
+            Finding("W_CHOSEN", f"{text.name} in the folder above is read for what it states of columns")
+        )
     force = profile.channel("force")
     stated += [f"force [{force.unit}]"] if force.unit and force.column is None else []  # heads columns 0 A, 0.5 A, ...
     timed = profile.file.sample_rate_Hz or profile.channel("time").unit
