@@ -100,6 +100,7 @@ def _from_table(text: str) -> Unit | None:
 
 def shown_unit(text: str) -> str:
     """Return a unit as it is written where a program has all of its header in capitals: daN of DAN."""
+    text = text.rstrip(".")
     capitals = text.isupper() and text not in _UNITS
     return next((name for name in _UNITS if name.upper() == text), text) if capitals else text
 
@@ -151,13 +152,10 @@ _COMPRESSION = tuple(words("compression"))
 _FACTOR = re.compile(r"[\s_][x×*·]\s?10+(?![0-9])|\bp-p\b")  # Force x10, Force p-p
 _CONDITION = re.compile(r"=\s*[+-]?[0-9]")  # stroke = 40
 _BRACKETED = re.compile(r"^(?P<name>.*?)\s*[\[({<](?P<unit>[^\[\](){}<>]{1,40})[\])}>]\s*$", re.DOTALL)
-_INNER = re.compile(
-    r"^(?P<name>[^\[({<]+?)\s*[\[({<](?P<unit>[^\[\](){}<>]{1,20})[\])}>]\s*(?:[-–:,;@|/]|(?:at|for|bei|mit|à|con|com)\b).*$",
-    re.DOTALL,
-)
-_RUN_BEHIND = re.compile(
-    rf"(?i)^(?P<name>[^\[({{<]+?)\s*[\[(](?P<unit>[^\[\](){{}}<>]{{1,20}})[\])]\s+"
-    rf"(?P<run>(?:{'|'.join(words('run'))})\W*[0-9].*)$",
+_INNER = re.compile(  # Position (mm) - Mod1/ai0; Force (N) Run #1, whose run is part of the name
+    r"^(?P<name>[^\[({<]+?)\s*[\[({<](?P<unit>[^\[\](){}<>]{1,20})[\])}>]"
+    r"\s*(?:(?:[-–:,;@|/]|(?:at|for|bei|mit|à|con|com)\b).*"
+    rf"|(?P<run>(?i:{'|'.join(words('run'))})\W*[0-9].*))$",
     re.DOTALL,
 )
 _SLASHED = re.compile(r"^(?P<name>.*\S)\s*(?:\s/\s*|,\s*|\s+(?:in|en|em)\s+|\s*;\s*)(?P<unit>\S{1,20})$", re.DOTALL)
@@ -224,12 +222,9 @@ def split_name(header: str, unit: str = "") -> Header:
         match = pattern.match(text)
         if match and parse_unit(match["unit"].strip()):
             return Header(match["name"].strip(), match["unit"].strip())
-    run = _RUN_BEHIND.match(text)
-    if run and parse_unit(run["unit"].strip()):  # Force (N) Run #1
-        return Header(f"{run['name']} {run['run']}", run["unit"].strip())
     inner = _INNER.match(text)
-    if inner and parse_unit(inner["unit"].strip()):  # Position (mm) - Mod1/ai0
-        return Header(inner["name"].strip(), inner["unit"].strip())
+    if inner and parse_unit(inner["unit"].strip()):
+        return Header(f"{inner['name'].strip()} {inner['run'] or ''}".rstrip(), inner["unit"].strip())
     # The longest tail that is a unit: velocity_m_s before velocity_m and s.
     for place in _FUSED.finditer(text):
         tail = text[place.end() :]
