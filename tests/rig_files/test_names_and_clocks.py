@@ -10,7 +10,7 @@ from mrdamper.rig_files.conditions import motions_in
 from mrdamper.rig_files.profile import parse_profile
 from mrdamper.rig_files.rig_import import import_files
 
-TIME = np.arange(2001) / 200
+TIME = np.arange(1001) / 200
 PHASE = 2 * np.pi * TIME
 
 

@@ -12,7 +12,7 @@ from mrdamper.rig_files.conditions import currents_in, stated_by_lines, stated_q
 from mrdamper.rig_files.profile import parse_profile
 from mrdamper.rig_files.rig_import import import_files
 
-T = np.arange(0.0, 3.0, 0.002)
+T = np.arange(0.0, 3.0, 0.005)
 X = 10 * np.sin(2 * np.pi * T + 0.3)  # [mm]
 
 
@@ -33,7 +33,7 @@ def rows(*columns, mark="."):
 
 def test_no_record_of_json_lines_is_cut(tmp_path):
     lines = [{"t_s": t, "pos_mm": x, "load_N": f, "I_A": 0.5} for t, x, f in zip(T, X, force(0.5), strict=True)]
-    time = np.arange(3 * T.size) * 0.002
+    time = np.arange(4 * T.size) * 0.005
     lines = [{**lines[i % T.size], "t_s": round(float(t), 6)} for i, t in enumerate(time)]
     (tmp_path / "a.jsonl").write_text("\n".join(map(json.dumps, lines)))
     (record,) = import_files([tmp_path / "a.jsonl"]).records
@@ -70,7 +70,7 @@ def test_a_decimal_comma_separates_no_name_from_its_number(tmp_path, title):
 
 def test_lines_of_cells_keep_their_separating_commas():
     assert [s.amperes for s in stated_by_lines(["Coil current,0.5,A", "Coil current, 0,5 A"])] == [0.5, 0.5]
-    assert stated_rate(stated_quantities(["Abtastrate 500 Hz, Spulenstrom 0,00 A"])) == 500
+    assert stated_rate(stated_quantities(["Abtastrate 200 Hz, Spulenstrom 0,00 A"])) == 200
 
 
 def test_a_column_of_texts_that_state_a_current_tells_tests_apart(tmp_path):
@@ -90,9 +90,9 @@ def test_a_name_without_its_condition_is_a_channel_and_a_condition_is_none():
 @pytest.mark.parametrize(
     "head",
     [
-        "# Abtastrate 500 Hz, Strom 0.5 A\n# Weg in mm, Kraft in N\n# Nr;Weg;Kraft\n",
-        "Strom: 0.5 A\nData rate;500 Hz\nNr;Weg;Kraft\n#;mm;N\n",
-        "Strom: 0.5 A\ndx [s];0.002;0.002\nNr;Weg [mm];Kraft [N]\n",
+        "# Abtastrate 200 Hz, Strom 0.5 A\n# Weg in mm, Kraft in N\n# Nr;Weg;Kraft\n",
+        "Strom: 0.5 A\nData rate;200 Hz\nNr;Weg;Kraft\n#;mm;N\n",
+        "Strom: 0.5 A\ndx [s];0.005;0.005\nNr;Weg [mm];Kraft [N]\n",
     ],
 )
 def test_units_and_rates_that_lines_state_are_taken(tmp_path, head):
@@ -101,14 +101,14 @@ def test_units_and_rates_that_lines_state_are_taken(tmp_path, head):
 
 
 def test_ranges_below_the_units_are_no_row(tmp_path):
-    head = "Sample rate;500;Hz\nCoil current;0.5;A\nName;Weg;Kraft\nUnits;mm;N\nFull scale;50;25000\n"
+    head = "Sample rate;200;Hz\nCoil current;0.5;A\nName;Weg;Kraft\nUnits;mm;N\nFull scale;50;25000\n"
     (tmp_path / "a.csv").write_text(head + rows(np.arange(1, T.size + 1), X, force(0.5)))
     (record,) = import_files([tmp_path]).records
     np.testing.assert_allclose(record.force, force(0.5), atol=1e-3)
 
 
 def test_one_value_for_all_columns_above_rows_that_begin_empty_is_no_row(tmp_path):
-    head = '"TraceName";"LOAD";"LVDT"\n"VUnit";"N";"mm"\n"HResolution";0.002;0.002\n"HUnit";"s";"s"\n'
+    head = '"TraceName";"LOAD";"LVDT"\n"VUnit";"N";"mm"\n"HResolution";0.005;0.005\n"HUnit";"s";"s"\n'
     head += '"Time";"10:31:22.123456";"10:31:22.123456"\n\n'
     (tmp_path / "a_0.5A.csv").write_text(
         head + "\n".join(";" + line for line in rows(force(0.5), X).splitlines()) + "\n"

@@ -500,7 +500,7 @@ def past_a_bypass(leak, viscous=1700.0):
     return runs
 
 
-@pytest.mark.parametrize("resistance", [3e4, 7e3])
+@pytest.mark.parametrize("resistance", [3e4, pytest.param(7e3, marks=pytest.mark.slow)])
 def test_a_bypass_that_carries_the_slow_motions_accuses_no_run(resistance):
     """Slow loops of a linear bypass have no yield displacement, which a leak describes."""
     assert find_contradictions(past_a_bypass(lambda force: force / resistance)) == []
