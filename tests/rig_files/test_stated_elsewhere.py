@@ -828,7 +828,7 @@ def test_names_and_units_are_read_as_a_careful_reader_does(head, scale, tmp_path
     folder = tmp_path / "0.5 A"
     folder.mkdir()
     table(folder / "a.csv", head, scale * T, X / (25.4 if "in." in head[0] else 1), force(0.5))
-    expect(tmp_path, 0.5)
+    expect(folder, 0.5)
     told = "".join(finding.text for finding in import_files([folder]).records[0].findings)
     assert ("README.txt in the folder above is read" in told) == ("Var1" in head[0])
 
@@ -846,10 +846,10 @@ def test_the_nearest_readme_states_the_scale(tmp_path):
     folder = tmp_path / "0.5 A"
     folder.mkdir()
     table(folder / "a.csv", ["Time [s],LVDT [V],Force [N]"], T, X / 10, force(0.5))
-    expect(tmp_path, 0.5)
+    expect(folder, 0.5)
     table(folder / "a.csv", ["Time [s],LVDT [V],Force [N]"], T, X / 5, force(0.5))
     (folder / "README.txt").write_text("LVDT: 5 mm/V\n")
-    expect(tmp_path, 0.5)
+    expect(folder, 0.5)
 
 
 def test_cycles_that_a_column_counts_are_one_test(tmp_path):
