@@ -1347,7 +1347,7 @@ def test_a_test_that_a_plan_calls_invalid_or_a_warm_up_is_asked_about(tmp_path, 
     (refusal,) = import_files([tmp_path]).refusals
     assert (refusal.error.code, refusal.run) == ("E_DISCARDED", files[1])
     assert repr(f"{heading}: {cell}") in refusal.error.found
-    remedy = parse_profile(refusal.error.remedy.split(" in a profile")[0].replace("set [file] ", "[file]\n"))
+    remedy = parse_profile("[file]\n" + refusal.error.remedy.split("set [file] ")[1].removesuffix(" in a profile"))
     result = import_files([tmp_path], remedy)
     assert not result.refusals
     assert currents(result.records) == [0.0, 0.5]
@@ -1359,6 +1359,7 @@ def test_a_test_that_a_plan_calls_invalid_or_a_warm_up_is_asked_about(tmp_path, 
         ("Procedure", ["3 warm-up cycles, then 6 measured cycles"] * 3), ("Warm-up done", ["yes"] * 3),
         ("Use cooling", ["no"] * 3), ("Used before [h]", ["0", "3", "3"]), ("Repeated", ["", "yes", ""]),
         ("Remark", ["", "after warm-up", ""]), ("Bemerkung", ["", "nach 10 Einlaufzyklen", ""]),
+        ("Bemerkung", ["", "Warmlauf davor", ""]),
         ("Remark", ["", "thermocouple failed, forces valid", ""]), ("Specimen", ["Void ratio 0.2"] * 3),
         ("Remark", ["warm-up"] * 3), ("Remark", ["", "not aborted, valid", ""]),
         ("Remark", ["", "replaces run 7 (invalid)", ""]), ("Bemerkung", ["", "Wiederholung von ungültigem Lauf 1", ""]),
@@ -1448,7 +1449,7 @@ def test_one_remedy_leaves_out_every_test_that_a_plan_discards(tmp_path):
     write_tests(tmp_path, (0.25, 0.5, 0.75))
     (tmp_path / "plan.csv").write_text("Run,Current [A],Remark\n1,0.25,void\n2,0.5,\n3,0.75,aborted\n")
     remedies = {refusal.error.remedy for refusal in import_files([tmp_path]).refusals}
-    assert [remedy.split(" in a profile")[0] for remedy in remedies] == [
+    assert [remedy[remedy.index("set [file]") :].split(" in a profile")[0] for remedy in remedies] == [
         'set [file] leave_out = ["run_1.csv", "run_3.csv"]'
     ]
     records, _ = found_tests([tmp_path])

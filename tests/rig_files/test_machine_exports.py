@@ -347,3 +347,48 @@ def test_numbers_of_tests_stand_beside_other_counters_and_clocks(tmp_path, count
     expect(tmp_path, 0.0, 0.6, profile=profile)
     findings = import_files([tmp_path], parse_profile(profile)).records[0].findings
     assert [f.text for f in findings] == [f"the rows of '0' in {noted!r}, before and after the tests, are left out"]
+
+
+def table(head, write=lambda t, x, f: f"{t:.4f},{x:.5f},{f:.3f}", amperes=0.6):
+    return f"{head}\n" + rows(write, amperes)
+
+
+def series(*channels, **beside):
+    of_each = [{"name": n, "unit": unit, "sampleRateHz": 250, "values": list(v)} for n, unit, v in channels]
+    return json.dumps({**beside, "series": of_each})
+
+
+PLAIN = "time [s],stroke [mm],force [N]"
+RANGES = '"Channel","Signal","Range","Scaling"\n"CH1","Stroke","5V","1 V = 4 mm"\n"CH2","Load","10V","1 V = 200 N"\n'
+
+
+@pytest.mark.parametrize(
+    "files",
+    [
+        {"a.dat": table(f"COIL CURRENT (AMPS DC) ........ 0.60\nTEMPERATURE (DEGC) ..... 21.0\n{PLAIN}")},
+        {"a.csv": table(f"{PLAIN},COIL_SET_A", lambda t, x, f: f"{t:.4f},{x:.5f},{f:.3f},0.6")},
+        {"a 0.6 A.csv": table("Zeit [s],Sollhub [mm],Isthub [mm],Kraft [N]", lambda t, x, f: f"{t},{1.1 * x},{x},{f}")},
+        {"a 0.6 A.csv": table("t [s],weg [1/10 mm],kraft [N]", lambda t, x, f: f"{t:.4f},{10 * x:.4f},{f:.3f}")},
+        {
+            "a 0.6 A.csv": table(
+                "Stamp,Weg,Kraft\nOLE-Date,mm,N", lambda t, x, f: f"{45608.4 + t / 86400:.12f},{x:.5f},{f:.3f}"
+            )
+        },
+        {"a 0.6 A.csv": RANGES + table("Time[s],CH1[V],CH2[V]", lambda t, x, f: f"{t},{x / 4:.6f},{f / 200:.6f}")},
+        {
+            "a.json": series(
+                ("force", "N", force(0.6)),
+                ("stroke", "mm", X),
+                setpoints={"coil": {"value": 600, "unit": "mA"}},
+            )
+        },
+        {
+            "ensaio_01.csv": table(PLAIN),
+            "plano.txt": "Ensaios 01 a 02: corrente 0,6 A\nEnsaios 03 a 04: corrente 0 A\n",
+        },
+    ],
+)
+def test_writings_of_industrial_exports_are_read(tmp_path, files):
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    expect(tmp_path, 0.6)

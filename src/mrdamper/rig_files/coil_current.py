@@ -15,7 +15,7 @@ from mrdamper.data.arrays import chunks
 from mrdamper.data.wording import number
 from mrdamper.errors import ColumnError, InputError, listed, printable
 from mrdamper.rig_files import conditions
-from mrdamper.rig_files.column_names import COIL, RATING, holds, names_condition, split_name
+from mrdamper.rig_files.column_names import COIL, RATING, holds, names_coil, names_condition, split_name
 from mrdamper.rig_files.columns import coil_currents
 from mrdamper.rig_files.conditions import LARGEST_STATED, Statement, contradicts, currents_in, stated_by_lines
 from mrdamper.rig_files.profile import Profile, current_in_name, toml
@@ -321,7 +321,8 @@ def _set_points(table: RawTable, rows: slice) -> list[Statement]:
     statements = []
     for column, header in enumerate(table.headers):
         unit = header.known
-        if unit is None or unit.dimension != "current" or not names_condition(header.name, "current"):
+        named = names_coil(header) or names_condition(header.name, "current")
+        if unit is None or unit.dimension != "current" or not named:
             continue
         values = table.try_read(column)
         if values is not None and (low := np.nanmin(values[column][rows])) == np.nanmax(values[column][rows]):
@@ -365,7 +366,9 @@ def held_current_of(table: RawTable, unit: str = "") -> float | None:
     """
     headers = {name: own if (own := split_name(name)).unit else split_name(name, unit) for name in table.constants}
     named = [(headers[name], value) for name, value in table.constants.items() if np.isfinite(value)]
-    named = [(header, value) for header, value in named if names_condition(header.name, "current")]
+    named = [
+        (header, value) for header, value in named if names_coil(header) or names_condition(header.name, "current")
+    ]
     measured = [(header, value) for header, value in named if header.role == "current"]
     stated = measured or named  # a set point, I_set_A = 0.5, where nothing else names a current
     held = {h.known.factor * value for h, value in stated if h.known and h.dimension == "current"}

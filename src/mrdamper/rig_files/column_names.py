@@ -92,6 +92,8 @@ def _from_table(text: str) -> Unit | None:
     text = _WORDS.get(text.lower(), text)
     if text in _UNITS:
         return _UNITS[text]
+    if (part := re.fullmatch("1/(10+) (.+)", text)) and (whole := _from_table(part[2])):  # 1/100 mm
+        return Unit(whole.dimension, whole.factor / int(part[1]))
     if text.isupper() and text.isascii():  # some programs write all of a header in capitals
         same = [unit for name, unit in _UNITS.items() if name.upper() == text]
         return same[0] if same and all(unit == same[0] for unit in same) else None
@@ -166,7 +168,8 @@ _RATE_GROUP = re.compile(r"\s+\d*\s*-\s*(?:default|fast|slow) sample rate", re.I
 _DEVICE = re.compile(r"\\[\w.-]{1,30}:[0-9]{1,3}$")  # F_rod\ES650:1
 _NODE = re.compile(r'(?<![^\s",;|])nsu?=[^;,"]{1,80};([isgb])=')  # of OPC UA, before the name of a node: ns=4;s=
 _NUMBER = re.compile("(?<![0-9])(?:0|[1-9][0-9]*)$")
-_FUSED = re.compile(r"[ _.:-]+")
+_FUSED = re.compile(r"[ _.:-]+|(?<=[a-z])(?=k?Hz$)")  # sampleRateHz
+_COMPARED = re.compile(rf"(?i)(?<![^\W\d_])(soll|ist)(?=(?:{'|'.join(_COMPOUNDS)}))")  # Sollweg and Istweg
 _AROUND_UNITS = words("around_units")
 _NEXT = re.compile(r"[,;|\t()]| (?:and|und|et|y|e|oraz|och|og|и) ")  # between the units of two channels
 _SMALL = MappingProxyType({"a": "current", "n": "force"})  # units of one letter in names in small letters
@@ -260,7 +263,8 @@ def headers_of(names: Sequence[str], units: Sequence[str]) -> tuple[Header, ...]
 
 def words_of(name: str) -> list[str]:
     """Return the words a name is made of: coil_current, coilCurrent, Coil current."""
-    return [word for word in re.split(r"[^\w]+|_|(?<=[a-zà-ÿ])(?=[A-Z])", name[:_LONGEST_NAME]) if word]
+    name = _COMPARED.sub(r"\1 ", name[:_LONGEST_NAME])
+    return [word for word in re.split(r"[^\w]+|_|(?<=[a-zà-ÿ])(?=[A-Z])", name) if word]
 
 
 @lru_cache(maxsize=4096)
@@ -349,6 +353,12 @@ def names_condition(key: str, role: str) -> bool:
     """Tell if the name of a line or an attribute stands for a channel's value in the whole test, set or measured."""
     kept = [word for word in words_of(key) if word.casefold() not in _SET]
     return bool(kept) and role_of(" ".join(kept)) == role and not RATING.search(key)
+
+
+def names_coil(header: Header) -> bool:
+    """Tell if a column or number in A is named after the coil, measured or set, and nothing else: COIL_SET_A."""
+    own = {word.casefold() for word in words_of(header.name)}
+    return header.dimension == "current" and not own.isdisjoint(COIL) and own <= COIL | _SET
 
 
 def names_command(name: str) -> bool:

@@ -44,6 +44,7 @@ _LINE = re.compile(
 CELL = re.compile(r"\s*([+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+))\s*((?:[^\W\d_]|°){0,8})\s*")  # with a unit
 LONGEST_LINE, _LONGEST_NAME, _MOST_PARTS = 300, 255, 20
 _TOLERANCE = re.compile(r"\s*(?:\+\s?/?\s?[-−]|±)\s*[0-9]+(?:[.,][0-9]+)?\s*%?")
+_LEADERS = re.compile(r"(?<=[^\s\d.])\s*\.{4,}\s*")  # COIL CURRENT (A) ...... 0.5
 FULL_SCALES = ("100", "1000", "255", "1023", "4095", "16383", "32767", "65535")  # largest numbers of converters
 _OF_SCALE = r"(?:m?[VA]|k?N|[mµ]?m|bar|counts?|bits?)"  # units
 _SCALE = re.compile(  # 60 mV = 10 A, 1 A per V, 0.5 A/V * U - 0.2 A, 2 A corresponds to 10 V, pwm 255 = 1.5 A
@@ -421,7 +422,7 @@ def stated_speed(quantities: Iterable[Quantity]) -> float | None:
 
 def _quantities(line: str, decimal: str | None) -> Iterator[Quantity]:
     """Yield what a line states: one quantity, or several behind each other."""
-    line = _TOLERANCE.sub("", _in_ascii(line[:LONGEST_LINE]))
+    line = _LEADERS.sub(": ", _TOLERANCE.sub("", _in_ascii(line[:LONGEST_LINE])))
     match = _LINE.match(line) or _SPACED.match(line)
     parts = [line] if match else re.split(r"[,;|]\s+|[{}\t]|\s{2,}", re.sub(r" *= +", "=", line))
     for part in parts[:_MOST_PARTS]:

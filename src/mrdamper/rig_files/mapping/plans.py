@@ -222,8 +222,8 @@ def discarded_tests(path: Path, results: Results | None, tests: Tests) -> dict[i
     names = last_parts(parts)
     left_out = toml([names[parts[i]] for i in refused])
     remedy = (
-        f"set [file] leave_out = {left_out} in a profile; to keep a test that is valid, write its current into "
-        "tests.csv (--write-tests), or correct the remark"
+        "to keep a test that is valid, write its current into tests.csv (--write-tests), or correct the remark; to "
+        f"omit those that are not, set [file] leave_out = {left_out} in a profile"
     )
     problems = {i: printable(f"{path.name} has the remark {of[:80]!r} on this test") for i, of in refused.items()}
     where = {i: files[i].name for i in refused}
