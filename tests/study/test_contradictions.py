@@ -226,9 +226,9 @@ def test_a_lag_that_the_check_of_the_record_states_is_the_cause_instead_of_anoth
         pytest.param("displacement", 1 / 25.4, 'unit = "inch"', marks=pytest.mark.slow),
         pytest.param("time", 5.0, 'unit = "s" and scale = 0.2', marks=pytest.mark.slow),
         pytest.param("rate", 0.2, "[file] sample_rate_Hz = ", marks=pytest.mark.slow),
-        ("current", 0.5, 'unit = "mA" and scale = 1 and offset = 500'),
+        pytest.param("current", 0.5, 'unit = "mA" and scale = 1 and offset = 500', marks=pytest.mark.slow),
         ("current", 0.5, "or with scale = 2: one current does not show which"),
-        ("current", 0.1, 'unit = "mA" and scale = 10'),
+        pytest.param("current", 0.1, 'unit = "mA" and scale = 10', marks=pytest.mark.slow),
     ],
 )
 def test_the_remedy_of_a_wrong_scale_obeyed_literally_corrects_the_test(sound, tmp_path, channel, factor, remedy):
