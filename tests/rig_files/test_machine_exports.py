@@ -392,3 +392,10 @@ def test_writings_of_industrial_exports_are_read(tmp_path, files):
     for name, text in files.items():
         (tmp_path / name).write_text(text)
     expect(tmp_path, 0.6)
+
+
+def test_a_number_that_is_no_current_of_the_coil_is_named_where_none_is_stated(tmp_path):
+    channels = ("force", "N", force(0.6)), ("stroke", "mm", X)
+    (tmp_path / "a.json").write_text(series(*channels, **{"Supply current (A)": 0.6}))
+    (refusal,) = import_files([tmp_path]).refusals
+    assert "number 'Supply current (A)' (of a limit, a supply or another device)" in refusal.error.found

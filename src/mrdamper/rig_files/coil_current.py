@@ -171,10 +171,11 @@ def require_current(record: Record, path: Path = Path()) -> Record:
 
 
 def not_taken(table: RawTable) -> tuple[Finding, ...]:
-    """Tell which columns and lines hold a current, where none of them is taken for that of the test, and why."""
-    columns = [name for name, header in zip(table.names, table.headers, strict=True) if header.dimension == "current"]
+    """Tell which columns, numbers and lines hold a current, where none is taken for that of the test, and why."""
+    shown = {f"column {table.names[i]!r}": table.names[i] for i in table.columns(dimension="current")}
+    shown |= {f"number {name!r}": name for name in table.constants if split_name(name).dimension == "current"}
     other = "of a limit, a supply or another device"
-    near = [f"column {n!r} ({other if RATING.search(n) else 'a command, or one of several'})" for n in columns]
+    near = [f"{text} ({other if RATING.search(n) else 'a command, or one of several'})" for text, n in shown.items()]
     whys = {line.strip()[:60]: conditions.why_not_taken(line) for line in table.lines}
     near += [f"{line!r} ({why})" for line, why in whys.items() if why]
     return (Finding("W_COLUMN", printable(f"{_NOT_TAKEN}{listed(near, 2)}")),) if near else ()
