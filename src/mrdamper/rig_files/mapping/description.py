@@ -90,15 +90,15 @@ _PLACES = ("column", "number", "index", "no", "position", "channel")  # of a col
 def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     """Add what short texts beside the file state of signs, and of names, units and scales where they lack."""
     lacking = bool(scales.scaled_columns(table)) or _lacks_names_or_units(table)
-    # A text above the folders that are read may be that of another rig, unless it is called as one on all of them.
+    # A text above the folders that are read may be of another rig: only a README there is used, and that is told.
     above = [f for f in path.parents[1:] if any(top == f or top in f.parents for top in READ_FOLDERS.get())]
     folders = [_texts_in(f, f.stat().st_mtime_ns) for f in (path.parent, *above)]
     texts = next((readme for readme, *_ in folders if readme), [])
     outer = [] if texts or above else _texts_in(top := path.parent.parent, top.stat().st_mtime_ns)[0]
     readme, structures, listing = folders[0]
-    for _, its_structures, its_listing in folders[1:2]:
-        structures = structures or its_structures
-        listing = listing if readme else [*listing, *its_listing]
+    if above:
+        structures = structures or folders[1][1]
+        listing = listing if readme else [*listing, *folders[1][2]]
     texts = texts + outer + (structures if lacking or len(structures) <= _FEW_FILES else [])
     texts = texts + [p for p in listing if lacking and p.stat().st_size <= _LARGEST_LIST]
     texts = [p for p in {*texts} if p.is_file() and p != path and not profile.leaves_out(*p.parts)]
