@@ -8,7 +8,7 @@ that shares nothing with the checks. Found: a finding or a refusal that the clea
 False alarms: findings on clean synthetic records and on the bundled runs. The table of
 docs/rig-procedure.md is printed with `--table`. Exit status 1 if a goal is missed: 90 % of the faults
 of the first set found whose effect is over 10 %, 60 % of those of 5 to 10 %, at most 0.5 % of the clean
-records accused. The second set is counted without a goal.
+records with a false alarm. The second set is counted without a goal.
 """
 
 from __future__ import annotations
@@ -117,8 +117,8 @@ def trials(kinds: Iterable[Kind], records: int, seed: int) -> Iterator[Trial]:
             yield Trial(kind, size, effect_of(record, faulty), codes_of(faulty) - codes_of(record))
 
 
-def accused(records: Iterable[Record]) -> Counter[str]:
-    """Count the codes found on clean records; "tried" counts the records, "records" those accused."""
+def false_alarms(records: Iterable[Record]) -> Counter[str]:
+    """Count the codes found on clean records; "tried" counts the records, "records" those with a finding."""
     found: Counter[str] = Counter()
     for record in records:
         codes = codes_of(record)
@@ -166,7 +166,7 @@ def table(tried: list[Trial]) -> str:
 
 def _said(false: Counter[str]) -> str:
     codes = {code: count for code, count in sorted(false.items()) if code not in ("tried", "records")}
-    return f"{false['records']} of {false['tried']} accused {codes or ''}"
+    return f"{false['records']} of {false['tried']} with a false alarm {codes or ''}"
 
 
 def main() -> int:
@@ -204,10 +204,10 @@ def main() -> int:
             if trial.effect > MODERATE and not trial.found:
                 print(f"    missed: {trial.kind.name}, {trial.size:.3g} {trial.kind.size}: {100 * trial.effect:.0f} %")
     for families in (FAMILIES, OTHERS):
-        false = accused(clean_records(arguments.clean, arguments.seed, families))
+        false = false_alarms(clean_records(arguments.clean, arguments.seed, families))
         failed |= false["records"] > GOALS["clean"] * arguments.clean
         print(f"clean records of {', '.join(families)}: {_said(false)}")
-    print(f"bundled runs, whose motion is partly no sine: {_said(accused(map(record_of, load_dataset())))}")
+    print(f"bundled runs, whose motion is partly no sine: {_said(false_alarms(map(record_of, load_dataset())))}")
     print(f"{time.perf_counter() - begin:.0f} s")
     return int(failed)
 

@@ -1,4 +1,4 @@
-"""A seeded part of the joint part of `benchmarks/coverage.py`."""
+"""A seeded subset of the joint part of `benchmarks/coverage.py`."""
 
 import sys
 from pathlib import Path

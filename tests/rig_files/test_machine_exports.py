@@ -333,7 +333,7 @@ def test_tables_of_a_database_are_joined_by_their_numbers(tmp_path):
     ],
 )  # a time of day is no clock of the column of tests behind it
 def test_numbers_of_tests_stand_beside_other_counters_and_clocks(tmp_path, counter, number, profile, noted):
-    """Rows that no test has, number 0, are left out though the damper moves in them."""
+    """Rows numbered 0 belong to no test and are omitted, although the damper moves in them."""
     lines, at = [], 0
     for test, amperes in ((0, 0.2), (1, 0.0), (0, 0.2), (2, 0.6), (0, 0.2)):
         for x, f in zip(X, force(amperes), strict=True):
@@ -346,7 +346,7 @@ def test_numbers_of_tests_stand_beside_other_counters_and_clocks(tmp_path, count
     (tmp_path / "shift.csv").write_text(head + "".join(lines))
     expect(tmp_path, 0.0, 0.6, profile=profile)
     findings = import_files([tmp_path], parse_profile(profile)).records[0].findings
-    assert [f.text for f in findings] == [f"the rows of '0' in {noted!r}, before and after the tests, are left out"]
+    assert [f.text for f in findings] == [f"the rows of '0' in {noted!r}, before and after the tests, are omitted"]
 
 
 def table(head, write=lambda t, x, f: f"{t:.4f},{x:.5f},{f:.3f}", amperes=0.6):

@@ -29,10 +29,10 @@ from fuzz.fuzz_records import (
     GOALS,
     LARGE,
     MODERATE,
-    accused,
     clean_records,
     codes_of,
     damping_and_peak,
+    false_alarms,
     share_found,
     table,
     trials,
@@ -337,14 +337,14 @@ def test_there_are_forty_kinds_and_each_changes_a_record():
         assert not same, kind.name
 
 
-def test_clean_records_of_every_family_are_not_accused():
+def test_clean_records_of_every_family_give_no_finding():
     assert not [n for n in range(3 * len(FAMILIES)) if codes_of(clean_record(n, np.random.default_rng([99, n])))]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("families", [FAMILIES, OTHERS], ids=["of the checks", "others"])
-def test_at_most_one_clean_record_in_two_hundred_is_accused(families):
-    false = accused(clean_records(400, 1, families))
+def test_at_most_one_clean_record_in_two_hundred_has_a_finding(families):
+    false = false_alarms(clean_records(400, 1, families))
     assert false["records"] <= GOALS["clean"] * 400, false
 
 

@@ -169,7 +169,7 @@ _DEVICE = re.compile(r"\\[\w.-]{1,30}:[0-9]{1,3}$")  # F_rod\ES650:1
 _NODE = re.compile(r'(?<![^\s",;|])nsu?=[^;,"]{1,80};([isgb])=')  # of OPC UA, before the name of a node: ns=4;s=
 _NUMBER = re.compile("(?<![0-9])(?:0|[1-9][0-9]*)$")
 _FUSED = re.compile(r"[ _.:-]+|(?<=[a-z])(?=k?Hz$)")  # sampleRateHz
-_COMPARED = re.compile(rf"(?i)(?<![^\W\d_])(soll|ist)(?=(?:{'|'.join(_COMPOUNDS)}))")  # Sollweg and Istweg
+_SET_OR_ACTUAL = re.compile(rf"(?i)(?<![^\W\d_])(soll|ist)(?=(?:{'|'.join(_COMPOUNDS)}))")  # Sollweg and Istweg
 _AROUND_UNITS = words("around_units")
 _NEXT = re.compile(r"[,;|\t()]| (?:and|und|et|y|e|oraz|och|og|и) ")  # between the units of two channels
 _SMALL = MappingProxyType({"a": "current", "n": "force"})  # units of one letter in names in small letters
@@ -263,7 +263,7 @@ def headers_of(names: Sequence[str], units: Sequence[str]) -> tuple[Header, ...]
 
 def words_of(name: str) -> list[str]:
     """Return the words a name is made of: coil_current, coilCurrent, Coil current."""
-    name = _COMPARED.sub(r"\1 ", name[:_LONGEST_NAME])
+    name = _SET_OR_ACTUAL.sub(r"\1 ", name[:_LONGEST_NAME])
     return [word for word in re.split(r"[^\w]+|_|(?<=[a-zà-ÿ])(?=[A-Z])", name) if word]
 
 

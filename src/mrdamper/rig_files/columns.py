@@ -385,14 +385,9 @@ def _ambiguous(table: RawTable, role: str, columns: Sequence[int]) -> RigFileErr
 
 def _or_split(table: RawTable) -> str:
     motions, forces = (len(table.columns(role)) for role in ("displacement", "force"))
-    each = (
-        "each displacement has its force and"
-        if motions == forces
-        else "each force"
-        if motions == 1 and forces > 2
-        else ""
-    )
-    return f', or [file] blocks = "split" if {each} is a test,' if each and forces > 1 else ""
+    if motions == forces > 1:
+        return ', or [file] blocks = "split" if each displacement has its force and is a test,'
+    return ', or [file] blocks = "split" if each force is a test,' if motions == 1 and forces > 2 else ""
 
 
 def sign_of(table: RawTable, profile: Profile, role: str) -> int | None:

@@ -108,9 +108,11 @@ def _by_run(table: RawTable, column: int, *, stated: bool) -> list[RawTable]:
         raise table.source.refuse("E_BLOCKS", problem, f"at most {MOST_RUNS} a file")
     tidy = [re.sub(r"^([0-9]+)[.,]0+$", r"\1", label.strip()) or "unnamed" for label in labels]
     stretches = np.bincount(codes[np.diff(codes, prepend=-1) != 0], minlength=len(labels))
-    between = [c for c in runs if IDLE.search(tidy[c]) and stretches[c] > 1 == max(np.delete(stretches, c), default=0)]
+    between = [
+        c for c in runs if IDLE.search(tidy[c]) and stretches[c] > 1 and max(np.delete(stretches, c), default=0) == 1
+    ]
     if between and len(runs) > 1:
-        text = f"the rows of {tidy[between[0]]!r} in {table.names[column]!r}, before and after the tests, are left out"
+        text = f"the rows of {tidy[between[0]]!r} in {table.names[column]!r}, before and after the tests, are omitted"
         table, runs = table.noted(Finding("W_TABLE", text)), [code for code in runs if code not in between]
     read = _remembered(table)
     others = [i for i in range(len(table.names)) if i != column]

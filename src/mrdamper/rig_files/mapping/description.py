@@ -108,17 +108,19 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     counts, of_file = partial(scales.counts_in, names=names), partial(said_of_file, name=path.name)
     several = [i for i, h in enumerate(table.headers) if h.role in SIGNED and len(table.columns(h.role)) > 1]
     alike = {name for i in several for name in (table.names[i], table.headers[i].name)}
-    about = [scales.states_sign, counts, partial(column_names.units_in, names=names), of_file]
-    about.append(lambda line: any(find_name(line, name) for name in alike))
-    # A current may be that of one test, or an example.
-    of_columns = re.sub("[:=]", " ", "; ".join(line for line in lines if about[-1](line) and currents_in(line)))
+
+    def of_several(line: str) -> bool:
+        return any(find_name(line, name) for name in alike)
+
+    about = [scales.states_sign, counts, partial(column_names.units_in, names=names), of_file, of_several]
+    # A current may be that of one test, or an example, unless one line without labels states those of several columns.
+    of_columns = re.sub("[:=]", " ", "; ".join(line for line in lines if of_several(line) and currents_in(line)))
     lines = [line for line in lines if not (stated_by_lines([line], ".") or stated_in_titles([line]))]
     stated = [of_columns] if len(currents_in(of_columns)) > 1 else []
     stated += [(lacking and _of_channels(line)) or line * any(tells(line) for tells in about) for line in lines]
-    for text in outer[:1] if any(stated) else ():
-        table = table.noted(
-            Finding("W_CHOSEN", f"{text.name} in the folder above is read for what it states of columns")
-        )
+    if outer and any(stated):
+        text = f"{outer[0].name} in the folder above is read for what it states of columns"
+        table = table.noted(Finding("W_CHOSEN", text))
     force = profile.channel("force")
     stated += [f"force [{force.unit}]"] if force.unit and force.column is None else []  # heads columns 0 A, 0.5 A, ...
     timed = profile.file.sample_rate_Hz or profile.channel("time").unit

@@ -54,13 +54,14 @@ def by_legend(lines: Sequence[str], tests: Tests) -> list[tuple[float, str]]:
     stems = [re.sub(r"(?<=[A-Za-z])0+(?=[0-9])", "", name) for name in names_of]
     words = [[*re.split(r"[^0-9A-Za-z]+", s), *_DECIMAL_CODE.findall(s.replace(",", "."))] for s in stems]
     words = [
-        [*own, *(code for word in own if _CODES.fullmatch(word) for code in _OF_CODES.findall(word))] for own in words
+        own + [code for word in own if _CODES.fullmatch(word) for code in _OF_CODES.findall(word)] for own in words
     ]
     codes = _with_scale(dict(stated), {word for own in words for word in own})
     if len(codes) < 2 or len(codes) < len(stated):
         return []
     own = [[code for code in codes if code in {*parts} | names] for parts, names in zip(words, files, strict=True)]
-    own = [[code for code in of if not any(code in o and "." in o for o in of if o != code)] for of in own]  # 4.5v
+    # Without the 5v of 4.5v.
+    own = [[code for code in of if not any(code in o and "." in o for o in of if o != code)] for of in own]
     return [(codes[of[0]], of[0].upper()) for of in own] if all(len(of) == 1 for of in own) else []
 
 

@@ -167,10 +167,10 @@ def _parts(table: RawTable) -> list[str]:
     """Return the lines beside a table, and the parts of those with several scales; without cells headed as ranges."""
     lines = list(table.lines)
     for head in (line for line in table.lines if _RANGE.search(line) and not re.search("[0-9]", line)):
-        mark = next((mark for mark in "\t;," if head.count(mark) > 1), "\t")
-        kept = [i for i, cell in enumerate(head.split(mark)) if not _RANGE.search(cell)]
-        alike = head.count(mark) if head.count(mark) > 1 else -1
-        lines = [mark.join(t.split(mark)[i] for i in kept) if t.count(mark) == alike else t for t in lines]
+        mark = next((mark for mark in "\t;," if head.count(mark) > 1), None)
+        if mark is not None:
+            kept, count = [i for i, cell in enumerate(head.split(mark)) if not _RANGE.search(cell)], head.count(mark)
+            lines = [mark.join(t.split(mark)[i] for i in kept) if t.count(mark) == count else t for t in lines]
     return [part for t in lines for part in (re.split(r"[,;|\t]\s*", t) if len(scales_in(t)) > 1 else [t])]
 
 
