@@ -12,6 +12,7 @@ from mrdamper.rig_files import tests_table
 from mrdamper.rig_files.mapping.proposals import displacement_of
 from mrdamper.rig_files.preview import question_of
 from mrdamper.rig_files.profile import parse_profile
+from mrdamper.rig_files.profile_template import profile_template
 from mrdamper.rig_files.rig_import import found_tests, import_files
 from mrdamper.rig_files.rig_record import recording_time
 
@@ -288,6 +289,26 @@ def test_currents_that_are_not_taken_are_named_where_one_is_missing(tmp_path, he
     table(tmp_path / "a.csv", [head, names], *columns)
     (refusal,) = import_files([tmp_path]).refusals
     assert refusal.error.found.endswith(f"; not taken for it: {shown}")
+    assert refusal.error.remedy.startswith("if it is the coil's, set [channels.current]") == (not head)
+
+
+def test_a_number_that_is_not_taken_for_the_current_is_one_answer_away(tmp_path):
+    """The refusal names it and its line of the profile, and the written profile holds that line as a comment."""
+    for name, current in (("a", 0.5), ("b", 1.0)):
+        channels = {"Time [s]": T, "Displacement [mm]": X, "Force [N]": force(current)}
+        np.savez(tmp_path / f"{name}.npz", **channels, **{"Supply current [A]": current})
+    refusals = import_files([tmp_path]).refusals
+    line = '[channels.current] column = "Supply current [A]"'
+    assert {refusal.error.remedy.partition(" in a profile")[0] for refusal in refusals} == {
+        f"if it is the coil's, set {line}"
+    }
+    written, _ = profile_template([tmp_path], parse_profile(""))
+    for answered in (
+        line.replace("] column", "]\ncolumn"),
+        re.sub("(?m)^#(?=.channels.current|column = .Sup)", "", written),
+    ):
+        records = import_files([tmp_path], parse_profile(answered)).records
+        assert [float(record.current[0]) for record in records] == [0.5, 1.0]
 
 
 def test_two_currents_are_named_where_either_may_be_that_of_the_coil(tmp_path):

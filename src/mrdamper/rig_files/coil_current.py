@@ -25,6 +25,8 @@ from mrdamper.rig_files.record import Finding, Record
 _FEWEST_SLOW = 5  # samples of a current that is recorded more rarely than the force
 NO_CHANNEL = "the current channel is "  # beginning of the finding on a column of no current
 _NOT_TAKEN = "not taken for it: "  # beginning of the finding on other currents
+_NONE = "no coil current in a column, or in the name of the file or of its folder"
+_USE = re.compile(": (?=if so, |if it is the coil's, )")  # within a finding, before the answer that uses what it names
 CURRENT_TOO = "and give the current of each test"  # within the remedy of a refusal of units or columns
 _CALIBRATION = 'give its calibration, [channels.current] unit = "A" and scale (A per its unit), in a profile'
 _PROFILE = "profile"  # where a current stands
@@ -151,21 +153,22 @@ def require_current(record: Record, path: Path = Path()) -> Record:
     places = _places(record, path)
     match = next(filter(None, map(conditions.behind_digits, places)), None)
     reasons = [f.text for f in record.findings if f.text.startswith(NO_CHANNEL)]
+    near = [f"{_NONE}; {f.text}" for f in record.findings if f.text.startswith(_NOT_TAKEN)]
     value, first = '"test1*" = 0.5', ""
-    if reasons and "may both" not in reasons[0]:
-        reasons[0], mark, line = reasons[0].partition(": if so, ")
-        first = f"{mark[2:] + line or _CALIBRATION}; else "
-    elif match and not reasons:
+    if match and not reasons:
         reasons = [f"{match[0]!r} in its name can be read as {match[2]} A or as {match[1]}.{match[2]} A"]
         stars = ("*", "*") if match.string in places[:2] else ("*/*", "*/*")
         value = f'"{stars[0]}[0-9]{match[0][1:]}{stars[1]}" = {match[2]}'
-    near = [f.text for f in record.findings if f.text.startswith(_NOT_TAKEN)]
+    reason, *use = _USE.split((*reasons, *near, _NONE)[0], maxsplit=1)
+    if use or (reason.startswith(NO_CHANNEL) and "may both" not in reason):
+        first = f"{(use or [_CALIBRATION])[0]}; else "
     raise ColumnError(
-        "; ".join(reasons[:1] or ["no coil current in a column, or in the name of the file or of its folder", *near]),
+        reason,
         where=Path(record.provenance.get("file", record.id)).name,
         remedy=f"{first}write the currents into tests.csv (--write-tests), or set one of these in a profile: [current] "
-        f'value = 0.5 of all tests, values = {{{value}}}, pattern = "*_{{current}}A_*" and unit = "A"; or '
-        '[channels.current] column = "..."',
+        f'value = 0.5 of all tests, values = {{{value}}}, pattern = "*_{{current}}A_*" and unit = "A"'
+        + '; or [channels.current] column = "..."'
+        * (not first),
         code="E_CURRENT_MISSING",
     )
 
@@ -178,7 +181,9 @@ def not_taken(table: RawTable) -> tuple[Finding, ...]:
     near = [f"{text} ({other if RATING.search(n) else 'a command, or one of several'})" for text, n in shown.items()]
     whys = {line.strip()[:60]: conditions.why_not_taken(line) for line in table.lines}
     near += [f"{line!r} ({why})" for line, why in whys.items() if why]
-    return (Finding("W_COLUMN", printable(f"{_NOT_TAKEN}{listed(near, 2)}")),) if near else ()
+    line = f"[channels.current] column = {toml(next(iter(shown.values()), ''))}"
+    use = f": if it is the coil's, set {line} in a profile" * (len(shown) == 1)
+    return (Finding("W_COLUMN", printable(f"{_NOT_TAKEN}{listed(near, 2)}{use}")),) if near else ()
 
 
 def ask_current_too(error: InputError, table: RawTable, profile: Profile, path: Path) -> None:

@@ -470,7 +470,8 @@ def _unit_problem(table: RawTable, role: str, column: int, unit: str) -> UnitErr
     if parsed is None:
         unit = unit or column_names.unknown_unit(table.names[column])
         problem = f"{named} has no unit" if not unit else f"{named} has the unit {unit!r}, which is not known"
-        remedy = f'write it into the header, or set [channels.{role}] unit = "..." in a profile'
+        multiple = ", with scale = ... where it is a multiple of that" if unit else ""
+        remedy = f'write it into the header, or set [channels.{role}] unit = "..." in a profile{multiple}'
         if unit.casefold() == "tonf":  # also 2000 lbf
             remedy = f'set [channels.{role}] unit = "tf" in a profile (1000 kgf), or unit = "lbf" and scale = 2000'
         if _CONVERTER.search(table.names[column]) or (role != "time" and _holds_whole_numbers(table, column)):

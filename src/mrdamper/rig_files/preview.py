@@ -36,7 +36,7 @@ _MEANT = {
 }
 _ROLE = re.compile(r"\[channels\.(\w+)\]")
 _UNITS = {
-    "time": ("s", "ms", "us"),
+    "time": ("s", "ms", "us", "days"),
     "length": ("mm", "m", "in", "cm"),
     "force": ("N", "kN", "lbf", "kgf", "tf"),
     "current": ("A", "mA"),

@@ -23,6 +23,7 @@ from mrdamper.rig_files.record import Refusal
 from mrdamper.rig_files.rig_import import ImportResult, import_files, read_runs
 
 _OF_MOTION = re.compile(r"(?i)0[ _]?m?(?:hz|mm)|(?<![a-z])(?:f|freq|hz|a|amp|x|run|test|t|n|no|nr)[ _=-]*0")
+_COLUMN_OF_CURRENT = re.compile(r'\[channels\.current\] column = ("(?:[^"\\.]|\\.)(?:[^"\\]|\\.)*")')  # not "..."
 _OF_CURRENT = re.compile(r"(?i)(?<![a-z])(?:i|cur\w*|amps?|coil)[ _=-]*$")
 
 _FORM = (
@@ -97,18 +98,18 @@ def _missing_currents(refusals: Sequence[Refusal], columns: Mapping[int, str]) -
         return ""
     lines = []
     reasons = ["" if r.error.code != "E_CURRENT_MISSING" else r.error.found for r in missing]  # else of units
-    refused = (name for name in columns.values() if name and any(f"column {name!r}" in why for why in reasons))
-    column = next(refused, None)
-    if column is not None:
-        shown = toml(column)
-        lines = ["# Calibration of the current: A for 1 of the column:", "#[channels.current]", f"#column = {shown}"]
-        lines += ['#unit = "A"', "#scale =", ""]
+    named = chain.from_iterable(_COLUMN_OF_CURRENT.findall(r.error.remedy) for r in missing)
+    refused = (toml(name) for name in columns.values() if name and any(f"column {name!r}" in why for why in reasons))
+    if shown := next(chain(named, refused), None):
+        lines = ["# Or this column or number as the current; scale: A for 1 of it:", "#[channels.current]"]
+        lines += [f"#column = {shown}", '#unit = "A"', "#scale =", ""]
     runs = [r.run or Path(r.file).stem for r in missing]
     paths = [escape("/".join(Path(r.file).parts[-2:]).replace(": ", "/")) for r in missing]
     names = [escape(run) if runs.count(run) == 1 else f"*/{path}" for run, path in zip(runs, paths, strict=True)]
     heading = '# Tests without a current: remove the #, write each current [A] behind its =, or "*" = ... for all:'
     lines += [heading, "#[current.values]"]
-    whys = [f"  # {text}" if text and not text.startswith("no coil current") else "" for text in reasons]
+    own = len(set(reasons)) > 1  # one reason of all tests stands in their refusal
+    whys = [f"  # {text}" if own and text and not text.startswith("no coil current") else "" for text in reasons]
     stated = dict(zip(_by_level(names), whys, strict=True))
     lines += [f"#{toml(name)} ={why}" for name, why in stated.items()]
     return "\n".join(["", *lines, ""])
@@ -144,6 +145,7 @@ def _alternatives(columns: Mapping[int, str], kinds: Mapping[str, Mapping[int, t
             "", *(lines or ["# Columns of the file, for column = \"...\" or column = NUMBER:", *named(columns)]),
             "# One current for all files ([current] value), or one in their names or folders:",
             '# pattern = "*_{current}A_*" or "*/{current}A/*"; {run}, {frequency}, {amplitude} stand for other numbers',
-            '# Files and tables that are no tests, and columns without use: [file] leave_out = ["warmup*"]', "",
+            '# Files and tables that are no tests, and columns without use: [file] leave_out = ["warmup*"]',
+            '# Several tests in one table: [file] run_column = "...", the column that numbers or names them', "",
         ]
     )  # fmt: skip
