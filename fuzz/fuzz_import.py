@@ -57,6 +57,7 @@ def seeds(formats: list[str] | None = None) -> dict[str, bytes]:
         "a.zip": lambda: zipped(plain),
         "a.xlsx": lambda: rig.xlsx_bytes([list(rig.NAMES), *table[:60].tolist()]),
         "a.parquet": lambda: rig.parquet_bytes(named),
+        "a.sqlite": lambda: rig.sqlite_bytes(samples=named),
         "a.npz": lambda: rig.npz_bytes(**named),
         "a.mat": lambda: rig.mat_bytes(named),
         "packed.mat": lambda: rig.mat_bytes({"data": named}, do_compression=True),

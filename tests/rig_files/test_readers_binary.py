@@ -22,6 +22,7 @@ from support.rig_files import (
     npz_bytes,
     parquet_bytes,
     rows,
+    sqlite_bytes,
     tdms_bytes,
     text,
     write,
@@ -34,7 +35,7 @@ from mrdamper.rig_files.preview import guess_profile
 from mrdamper.rig_files.profile import parse_profile
 from mrdamper.rig_files.readers import all_readers
 from mrdamper.rig_files.readers.hdf5 import Hdf5
-from mrdamper.rig_files.rig_import import read_run, read_runs
+from mrdamper.rig_files.rig_import import import_files, read_run, read_runs
 
 CLEAN = text()
 SHORT = dict(zip(("time", "disp", "force"), rows().T, strict=True))
@@ -83,6 +84,8 @@ GOOD = {
     "stamps.xlsx": lambda: xlsx_bytes(typed_sheet()),
     "a.parquet": lambda: parquet_bytes(columns()),
     "stamps.parquet": lambda: parquet_bytes(datetimes()),
+    "a.sqlite": lambda: sqlite_bytes(samples=columns()),
+    "logged.db": lambda: sqlite_bytes(samples=columns()).replace(b"\1\1", b"\2\2", 1),  # written by way of a log
     "a.mat": lambda: mat_bytes(columns()),
     "version4.mat": lambda: mat_bytes(columns(), format="4"),
     "packed.mat": lambda: mat_bytes(columns(), do_compression=True),
@@ -118,6 +121,9 @@ BAD = {
     "truth.parquet": (lambda: parquet_bytes({**columns(), "force_N": np.ones(600, dtype=bool)}), "E_NUMBER"),
     "text.parquet": (lambda: parquet_bytes({**columns(), "force_N": np.array(["a"] * 600)}), "E_NUMBER"),
     "bomb.parquet": (lambda: parquet_bytes({n: np.zeros(10_000_000) for n in NAMES}), "E_ARCHIVE_RATIO"),
+    "cut.sqlite": (lambda: sqlite_bytes(samples=columns())[:-5000], "E_FORMAT"),
+    "none.sqlite": (lambda: sqlite_bytes(samples={name: np.empty(0) for name in NAMES}), "E_NO_DATA"),
+    "sqlite.csv": (lambda: sqlite_bytes(samples=columns()), "E_FORMAT"),
     "cut.mat": (lambda: mat_bytes(columns())[:-1000], "E_TRUNCATED"),
     "cells.mat": (lambda: mat_bytes({**columns(), "force_N": np.array([[1], "a"], dtype=object)}), "E_UNSAFE"),
     "lengths.mat": (lambda: mat_bytes({**columns(), "force_N": np.arange(5.0)}), "E_FIELD_COUNT"),
@@ -233,6 +239,20 @@ def test_several_sheets_are_several_runs(tmp_path):
     assert [record.id for record in read_runs(path)] == ["a_Data", "a_Second"]
     named = read_run(path, parse_profile('[file]\nsheet = "Second"\n'))
     np.testing.assert_allclose(named.time, np.arange(600) / RATE, rtol=0, atol=1e-12)
+
+
+def test_tables_of_a_database_are_joined_and_a_log_that_is_not_in_it_is_refused(tmp_path):
+    samples = [{"run": np.full(600, i), **columns(seed=i)} for i in (1, 2)]
+    both = {name: np.concatenate([of[name] for of in samples]) for name in samples[0]}
+    content = sqlite_bytes(runs={"run": np.array([1, 2]), "current_A": np.array([0.5, 1.0])}, samples=both)
+    path = write(tmp_path, "rig.sqlite", content)
+    records = import_files([path]).records
+    assert [float(record.current[0]) for record in records] == [0.5, 1.0]
+    for record, of in zip(records, samples, strict=True):
+        np.testing.assert_allclose(record.force, of["force_N"], rtol=0, atol=1e-9)
+    write(tmp_path, "rig.sqlite-wal", b"rows")
+    with pytest.raises(InputError, match=r"rig\.sqlite-wal holds rows that are not in the database yet"):
+        read_runs(path)
 
 
 def test_a_sheet_that_lists_quantities_states_them_for_the_record_beside_it(tmp_path):

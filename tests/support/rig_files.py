@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import json
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -110,6 +112,18 @@ def cdf_bytes(table: dict[str, np.ndarray]) -> bytes:
         file.createVariable(name, "d", ("row",))[:] = values
     file.flush()
     return target.getvalue()
+
+
+def sqlite_bytes(**tables: dict[str, np.ndarray]) -> bytes:
+    import sqlite3
+
+    with closing(sqlite3.connect(":memory:")) as database:
+        for name, table in tables.items():
+            database.execute(f'CREATE TABLE "{name}" ({", ".join(map(json.dumps, table))})')
+            marks = ", ".join("?" * len(table))
+            database.executemany(f'INSERT INTO "{name}" VALUES ({marks})', np.column_stack([*table.values()]).tolist())
+        database.commit()
+        return database.serialize()
 
 
 def mat_bytes(table: dict, **kwargs) -> bytes:

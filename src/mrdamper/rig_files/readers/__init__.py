@@ -24,7 +24,7 @@ _FOREIGN = MappingProxyType(
     {
         b"%PDF": "PDF", b"\x89PNG": "PNG image", b"\xff\xd8\xff": "JPEG image", b"GIF8": "GIF image",
         b"\xd0\xcf\x11\xe0": "old Excel or Word", b"BZh": "bzip2", b"\xfd7zXZ": "xz", b"7z\xbc\xaf": "7-Zip",
-        b"Rar!": "RAR", b"\x28\xb5\x2f\xfd": "Zstandard", b"\x7fELF": "program", b"SQLite format 3": "SQLite",
+        b"Rar!": "RAR", b"\x28\xb5\x2f\xfd": "Zstandard", b"\x7fELF": "program",
         b"{\\rtf": "RTF", b"<!DOCTYPE": "HTML", b"<!doctype": "HTML", b"<html": "HTML", b"<HTML": "HTML",
         b"<?xml": "XML", b"RIFF": "RIFF",
     }

@@ -73,7 +73,7 @@ def tables_of_sheets(source: Source, sheets: Sequence[tuple[str, Source]], form:
         (lists if noted else all_tables).extend(tables)
     all_tables = all_tables or lists
     if not all_tables:
-        raise first or source.refuse("E_NO_DATA", "no sheet holds data", "export the file again")
+        raise first or source.refuse("E_NO_DATA", "no sheet or table holds data", "export the file again")
     all_tables = [replace(table, remarks=(*table.remarks, *beside)) for table in all_tables]
     return all_tables if len(all_tables) > 1 else [replace(all_tables[0], label="")]
 
@@ -83,11 +83,8 @@ def _sheets(source: Source, form: FileForm) -> list[tuple[str, Source]]:
     calamine = load("python_calamine", Workbook.title)
     book = calamine.load_workbook(source.file)
     names = [sheet.name for sheet in book.sheets_metadata if sheet.typ == calamine.SheetTypeEnum.WorkSheet]
-    if form.sheet is not None and form.sheet not in names:
-        problem = f"no sheet {form.sheet!r} (found {', '.join(names)})"
-        raise source.refuse("E_COLUMN", problem, "correct [file] sheet of the profile")
     texts = []
-    for name in names if form.sheet is None else [form.sheet]:
+    for name in chosen_sheets(source, names, form):
         sheet = book.get_sheet_by_name(name)
         start = sheet.start or (0, 0)
         rows = _filled_down(sheet.iter_rows(), start, sheet.merged_cell_ranges or ())
@@ -97,6 +94,14 @@ def _sheets(source: Source, form: FileForm) -> list[tuple[str, Source]]:
     if not texts:
         raise source.refuse("E_NO_DATA", "the sheets are empty", "export the file again")
     return texts
+
+
+def chosen_sheets(source: Source, names: Sequence[str], form: FileForm) -> Sequence[str]:
+    """Return the sheet that a profile names, else all; E_COLUMN if there is none of that name."""
+    if form.sheet is not None and form.sheet not in names:
+        problem = f"no sheet {form.sheet!r} (found {', '.join(names)})"
+        raise source.refuse("E_COLUMN", problem, "correct [file] sheet of the profile")
+    return names if form.sheet is None else [form.sheet]
 
 
 def _filled_down(rows: Iterable[list], start: tuple[int, int], merged: Iterable[_Range]) -> Iterator[list]:
