@@ -165,9 +165,12 @@ def test_a_unit_of_the_profile_wins_over_an_unknown_one_but_not_over_another_dim
     path = write(tmp_path, "a.csv", text(header=("t;x;F", "s;mm;blub"), separator=";"))
     profile = parse_profile('[channels.force]\nunit = "N"\n')
     np.testing.assert_allclose(read_run(path, profile).force, channels()["force"], rtol=0, atol=1e-6)
-    path = write(tmp_path, "b.csv", text(header=("t;x;F", "s;mm;V"), separator=";"))
-    with pytest.raises(InputError, match=r"scale.*E_UNITS_DIMENSION"):
-        read_run(path, profile)
+    for unit in ("V", "mV/V", "um/m", "mm", "bar"):
+        path = write(tmp_path, "b.csv", text(header=("t;x;F", f"s;mm;{unit}"), separator=";"))
+        with pytest.raises(InputError, match=r"scale.*E_UNITS_DIMENSION"):
+            read_run(path, profile)
+        scaled = read_run(path, parse_profile('[channels.force]\nunit = "N"\nscale = 2.0\n'))
+        np.testing.assert_allclose(scaled.force, 2 * channels()["force"], rtol=0, atol=1e-5)
 
 
 def test_columns_by_number_and_by_name(tmp_path):

@@ -275,6 +275,21 @@ def test_rows_in_another_order_than_the_tests_are_refused_where_their_peak_force
 
 
 @pytest.mark.parametrize(
+    ("line", "unit", "code"),
+    [
+        ("Force: 1 mV/V = 10 kN", "mV/V", None), ("Load cell: 20 kN per 2 mV/V", "mV/V", None),
+        ("Load cell: 2 mV/V = 20 kN", "V", "E_UNITS_DIMENSION"), ("", "mV/V", "E_UNITS_DIMENSION"),
+    ],
+)  # fmt: skip
+def test_a_load_cells_sensitivity_scales_what_is_in_mv_per_v_and_no_volts(line, unit, code, tmp_path):
+    names = f"Time [s],Displacement [mm],Force [{unit}]"
+    table(tmp_path / "a_0.5A.csv", [line, names], T, X, force(0.5) / 1e4)
+    result = import_files([tmp_path])
+    assert [refusal.error.code for refusal in result.refusals] == [code] * bool(code)
+    assert all(record.force == pytest.approx(force(0.5), abs=0.1) for record in result.records)
+
+
+@pytest.mark.parametrize(
     ("head", "shown"),
     [
         ("Fuse: 10 A", "'Fuse: 10 A' (of a limit, a supply or another device)"),

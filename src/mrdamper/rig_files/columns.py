@@ -31,6 +31,7 @@ ROLES = (*REQUIRED, *OPTIONAL)
 _DERIVED = ("velocity", "acceleration")  # of the displacement
 _MOST_RESTARTS = 0.05  # of the samples of a clock that counts within steps
 _TOTAL = re.compile(r"total|absolut|gesamt|cumulat|kumul", re.IGNORECASE)
+_OF_SENSORS = ("voltage", "count", "ratio", "dimensionless")  # which a calibration leads from
 _COUNTS = ("counts", *column_names.TABLES["unit_names"]["counts"])
 _PHASES = (frozenset("UVW"), frozenset("RST"), frozenset(("L1", "L2", "L3")))  # of a motor, at the end of a name
 _INDEX, _MEASURED = words("sample"), words("measured")
@@ -405,9 +406,10 @@ def _convert(table: RawTable, role: str, column: int, profile: Profile, asks_cur
     header, channel, sign = table.headers[column], profile.channel(role), sign_of(table, profile, role)
     unit = channel.unit or header.unit
     unit = "degF" if role == "temperature" and (unit or column_names.unknown_unit(table.names[column])) == "F" else unit
-    uncalibrated = channel.scale is None and header.dimension in ("voltage", "count")  # no unit makes them newtons
+    held = "velocity" if channel.integrate else role
+    uncalibrated = channel.scale is None and header.dimension not in (None, DIMENSION[held], "mass")  # V are no newtons
     for text in (unit, header.unit) if uncalibrated else (unit,):
-        problem = _unit_problem(table, "velocity" if channel.integrate else role, column, text)
+        problem = _unit_problem(table, held, column, text)
         if problem is not None:
             if role in REQUIRED or (role == "current" and asks_current):
                 raise problem
@@ -479,12 +481,12 @@ def _unit_problem(table: RawTable, role: str, column: int, unit: str) -> UnitErr
         return _refusal(UnitError, table, problem, remedy, "E_UNITS_MISSING")
     if parsed.dimension == DIMENSION[role]:
         return None
-    remedy = f'set [channels.{role}] unit = "..." in a profile, or name another column'
+    remedy = f"give the calibration: [channels.{role}] unit and scale (unit per {unit}) in a profile"
     if parsed.dimension == "mass" and role == "force":
         force = "kgf" if parsed.factor == 1 else "lbf"
         remedy = f'if the force of that weight is meant, set [channels.force] unit = "{force}" in a profile'
-    if parsed.dimension in ("voltage", "count"):
-        remedy = f"give the calibration: [channels.{role}] unit and scale (unit per {unit}) in a profile"
+    elif parsed.dimension not in _OF_SENSORS:
+        remedy += ", or name another column"
     problem = f"{named} is in {unit}, which is no unit of {DIMENSION[role]}"
     return _refusal(UnitError, table, problem, remedy, "E_UNITS_DIMENSION")
 

@@ -1,4 +1,4 @@
-"""Scales that a file states of channels in volts, counts or per cent, and senses in which it counts positive."""
+"""Scales that a file states of channels in volts, mV/V, counts or per cent, and senses in which it counts positive."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ from mrdamper.rig_files.record import SIGNED, Finding
 _MONITOR = words("monitor")
 _AROUND = r"(?:\+ ?/? ?[-−–]|±) ?"  # zero
 SCALE = re.compile(
-    rf"(?P<around>{_AROUND})?(?P<minus>(?<![\w.,)])[-−])?(?<![\w.,])(?P<one>[0-9]+(?:[.,][0-9]+)?)\s*(?P<unit>[A-Za-zµ]{{1,6}}|%)"
+    rf"(?P<around>{_AROUND})?(?P<minus>(?<![\w.,)])[-−])?(?<![\w.,])(?P<one>[0-9]+(?:[.,][0-9]+)?)\s*(?P<unit>mV/V|[A-Za-zµ]{{1,6}}|%)"
     r"(?:\s*(?:PWM|duty(?: cycle)?|drive|output))?\s*(?:/|=|per|pro|entspricht|->)\s*"
-    rf"(?(around)(?:{_AROUND})?)(?P<other>[0-9]+(?:[.,][0-9]+)?)?\s*(?P<volt>[A-Za-zµ]{{1,6}}|%)(?![A-Za-z0-9/])"
+    rf"(?(around)(?:{_AROUND})?)(?P<other>[0-9]+(?:[.,][0-9]+)?)?\s*(?P<volt>mV/V|[A-Za-zµ]{{1,6}}|%)(?![A-Za-z0-9/])"
 )
 _PER_COUNT = re.compile(
     r"(?P<number>[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]+)?)\s*(?P<unit>[A-Za-zµ/]{1,6}?)(?:\s*(?:/|per)\s*"
@@ -39,7 +39,7 @@ _PER_COUNT = re.compile(
     re.IGNORECASE,
 )
 _CHANNELS = {dimension: role for role, dimension in DIMENSION.items()}
-_SIGNALS = ("voltage", "count")  # what a scale leads from
+_SIGNALS = ("voltage", "count", "ratio")  # what a scale leads from
 _UNKNOWN = (None, "voltage")  # channels of columns that may be the monitor of a current
 _AT = r"(?P<{}>[+-]?[0-9]{{1,10}}(?:\.[0-9]{{1,6}})?)(?![.,]?[0-9])\s*(?P<{}>[a-zµ]{{0,6}}|%)"
 _ZERO = re.compile(  # zero at 32768; 0 A at 0.4 V; 0.5 A/V x (U - 0.4 V); 2.5 V at 0 A
@@ -153,7 +153,7 @@ def _shifted_elsewhere(table: RawTable, column: int, own: str, role: str) -> boo
 
 
 def scaled_columns(table: RawTable) -> list[int]:
-    """Return the columns in volts, counts or per cent, which mean something by a scale alone."""
+    """Return the columns in volts, mV/V, counts or per cent, which mean something by a scale alone."""
     return [i for i, header in enumerate(table.headers) if header.dimension in _SIGNALS]
 
 
@@ -176,12 +176,12 @@ def _parts(table: RawTable) -> list[str]:
 
 def _stated_scale(table: RawTable, column: int, volts: Sequence[int]) -> tuple[str, str, float, str] | None:
     """Return channel, unit, number per volt and line of the scale that can only be meant for a column; else None."""
-    name = table.headers[column].name
+    name, signal = table.headers[column].name, table.headers[column].dimension
     own = [table.names[column], *table.over[column : column + 1]]
     for lines in (own, _parts(table)):
         scales = []
         for line in lines:
-            for role, unit, factor in scales_in(line):
+            for role, unit, factor in scales_in(line, (signal,)):
                 meant = role_of(name) == role or lines is own or name.casefold() in line.casefold()
                 alone = len(volts) == 1 or holds(name, _MONITOR)
                 meant = meant or (role == "current" and role_of(name) in _UNKNOWN and alone)
@@ -194,12 +194,17 @@ def _stated_scale(table: RawTable, column: int, volts: Sequence[int]) -> tuple[s
     return None
 
 
-def scales_in(line: str) -> list[tuple[str, str, float]]:
-    """Return channel, unit and number per volt of every scale that a line states: 0.5 A/V, 100 mV/A, 1 V = 2 A."""
+def scales_in(line: str, of: Collection[str | None] = _SIGNALS) -> list[tuple[str, str, float]]:
+    """Return channel, unit and number per signal of every scale that a line states: 0.5 A/V, 100 mV/A, 1 V = 2 A.
+
+    The signals are of the given dimensions: what a load cell has per mV/V it has not per volt of its amplifier.
+    """
     scales = []
     for match in SCALE.finditer(line[:LONGEST_LINE]):
         one, other = parse_unit(match["unit"]), parse_unit(match["volt"])
         if one is None or other is None or (one.dimension in _SIGNALS) == (other.dimension in _SIGNALS):
+            continue
+        if not {one.dimension, other.dimension} & {*of}:
             continue
         left, right = (float((match[key] or "1").replace(",", ".")) for key in ("one", "other"))
         if not left or not right:
