@@ -19,7 +19,7 @@ from mrdamper.rig_files.mapping.description import short_lines
 from mrdamper.rig_files.profile import Profile, parse_profile
 from mrdamper.rig_files.readers import raw_tables
 
-T = np.arange(601) / 200.0
+T = np.arange(401) / 200.0
 X = 12.0 * np.sin(2 * np.pi * T)
 V = np.gradient(X, T)
 CURRENTS = {"m07": 0.2, "m08": 0.9, "m09": 0.0}

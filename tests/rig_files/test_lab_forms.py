@@ -18,7 +18,7 @@ from mrdamper.rig_files.profile_template import profile_template
 from mrdamper.rig_files.readers.arrays import unit_in
 from mrdamper.rig_files.rig_import import found_tests, import_files, read_run, read_runs
 
-T = np.arange(0.0, 4.0, 0.01)
+T = np.arange(0.0, 3.0, 0.01)
 V = np.cos(2 * np.pi * T)
 X = 10 * np.sin(2 * np.pi * T)  # [mm]
 
@@ -441,7 +441,7 @@ def test_rests_between_the_numbered_tests_have_no_row_in_a_plan_and_motions_with
 
 @pytest.mark.parametrize("gap", [0.0, 9.0])
 def test_parts_of_a_record_without_the_heading_of_the_first_go_on_by_their_clock(tmp_path, gap):
-    for part, inside in enumerate((slice(0, 150), slice(150, 300), slice(300, None)), 1):
+    for part, inside in enumerate((slice(0, 150), slice(150, 230), slice(230, None)), 1):
         head = "Tempo (s),Deslocamento (mm),Força (N)\n" if part == 1 else ""
         table = rows(T[inside] + gap * part, X[inside], force(0.5)[inside])
         (tmp_path / f"E_0.5A_parte{part}.txt").write_text(head + table, encoding="utf-8")
@@ -453,7 +453,7 @@ def test_parts_of_a_record_without_the_heading_of_the_first_go_on_by_their_clock
 
 @pytest.mark.parametrize("damaged", [2, 3])
 def test_parts_before_one_that_cannot_be_used_are_no_test(tmp_path, damaged):
-    for part, inside in enumerate((slice(0, 150), slice(150, 300), slice(300, None)), 1):
+    for part, inside in enumerate((slice(0, 150), slice(150, 230), slice(230, None)), 1):
         table = rows(T[inside], X[inside], force(0.5)[inside])
         table = table[:-1] + "x\n" if part == damaged else table
         (tmp_path / f"a_0.5A_part{part}.csv").write_text("Time (s),Displacement (mm),Force (N)\n" + table)
@@ -1279,14 +1279,14 @@ def test_samples_of_several_tests_as_objects_with_stamps_and_objects_within_are_
     for run, amperes in (("r01", 0.0), ("r02", 0.5)):
         for t, x, f in zip(T, X, force(amperes), strict=True):
             stamp = f"2024-05-06T09:{14 + (run == 'r02')}:{22 + t:06.3f}Z"
-            coil = {"set_A": amperes, "meas_A": amperes + 1e-3 * np.sin(t)}
+            coil = {"set_A": amperes, "meas_A": amperes + 1e-3 * np.sin(9 * t)}
             lines.append(json.dumps({"ts": stamp, "run": run, "pos_mm": x, "force_N": f, "coil": coil}))
     (tmp_path / "telemetry.jsonl").write_text("\n".join(lines))
     records = import_files([tmp_path]).records
     assert currents(records) == [0.0, 0.5]
     np.testing.assert_allclose(records[1].time - records[1].time[0], T, atol=1e-9)
     np.testing.assert_allclose(records[1].force, force(0.5))
-    uneven = [line.replace("pos_mm", "x") if i % 2 else line for i, line in enumerate(3 * lines)]
+    uneven = [line.replace("pos_mm", "x") if i % 2 else line for i, line in enumerate(4 * lines)]
     (tmp_path / "telemetry.jsonl").write_text("\n".join(uneven))
     (refusal,) = import_files([tmp_path]).refusals
     assert "samples as records with the same keys" in str(refusal.error)
@@ -1581,14 +1581,14 @@ def test_a_plan_of_the_ranges_of_one_record_gives_each_test_the_current_of_its_r
     [
         (
             "plan.csv",
-            "File,Start row,End row,Current (A)\nrun_1.csv,1,250,0.25\nrun_2.csv,1,400,0.5\n",
+            "File,Start row,End row,Current (A)\nrun_1.csv,1,150,0.25\nrun_2.csv,1,300,0.5\n",
             HEAD,
-            [250, 400],
+            [150, 300],
         ),
-        ("plan.csv", "Test,Start (s),End (s),Current (A)\n1,1,3,0.25\n2,1,4,0.5\n", HEAD, [201, 300]),
-        ("plan.csv", "Test,Start (s),End (s)\n1,1,3\n2,1,4\n", "# coil current: {} A\n" + HEAD, [201, 300]),
-        ("plan.csv", "Test,Start (s),End (s),Current (A)\n1,1,3,0.25\n2,11,13,0.5\n", HEAD, [400, 400]),
-        ("tests.csv", "file,current_A,start_s,end_s\nrun_1.csv,0.25,1,3\nrun_2.csv,0.5,1,4\n", HEAD, [201, 300]),
+        ("plan.csv", "Test,Start (s),End (s),Current (A)\n1,1,2,0.25\n2,1,3,0.5\n", HEAD, [101, 200]),
+        ("plan.csv", "Test,Start (s),End (s)\n1,1,2\n2,1,3\n", "# coil current: {} A\n" + HEAD, [101, 200]),
+        ("plan.csv", "Test,Start (s),End (s),Current (A)\n1,1,2,0.25\n2,11,12,0.5\n", HEAD, [300, 300]),
+        ("tests.csv", "file,current_A,start_s,end_s\nrun_1.csv,0.25,1,2\nrun_2.csv,0.5,1,3\n", HEAD, [101, 200]),
     ],
 )
 def test_each_test_is_cut_to_its_start_and_end_in_a_plan_if_they_are_on_its_own_clock(
@@ -1749,9 +1749,10 @@ def test_a_stroke_that_all_tests_of_a_plan_have_may_be_the_dampers(tmp_path):
 
 
 def test_a_current_that_heat_lowers_does_not_excuse_a_force_that_fades(tmp_path):
-    fading, current = np.linspace(1.0, 0.5, T.size), np.linspace(1.0, 0.93, T.size)
+    t, x, steady = (np.r_[channel, more] for channel, more in ((T, 3 + T), (X, X), (force(1.0, 1), force(1.0, 2))))
+    fading, current = np.linspace(1.0, 0.5, t.size), np.linspace(1.0, 0.93, t.size)
     heads = "time [s],displacement [mm],force [N],current [A]\n"
-    (tmp_path / "run_1.csv").write_text(heads + rows(T, X, fading * force(1.0, 1), current))
+    (tmp_path / "run_1.csv").write_text(heads + rows(t, x, fading * steady, current))
     (record,) = import_files([tmp_path]).records
     assert "W_UNSTEADY" in {finding.code for finding in record.findings}
 

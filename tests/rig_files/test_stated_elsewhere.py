@@ -16,7 +16,7 @@ from mrdamper.rig_files.profile_template import profile_template
 from mrdamper.rig_files.rig_import import found_tests, import_files
 from mrdamper.rig_files.rig_record import recording_time
 
-T = np.arange(0.0, 3.0, 0.005)
+T = np.arange(0.0, 3.0, 0.01)
 X = 10 * np.sin(2 * np.pi * T + 0.3)  # [mm]
 
 
@@ -202,12 +202,12 @@ def test_samples_are_counted_where_the_clock_repeats_itself_and_the_rate_is_stat
     rows = [f"{t},{x:.4f},{f:.3f}" for t, x, f in zip(coarse, X, force(0.5), strict=True)]
     head = f"{name},Displacement [mm],Force [N]\n"
     path = tmp_path / "a_0.5A.csv"
-    path.write_text("Sample rate: 200 Hz\n" + head + "\n".join(rows))
+    path.write_text("Sample rate: 100 Hz\n" + head + "\n".join(rows))
     expect(tmp_path, 0.5)
     path.write_text(head + "\n".join(rows))
     (refusal,) = import_files([tmp_path]).refusals
     assert (refusal.error.code, "sample_rate_Hz" in refusal.error.remedy) == ("E_TIME_DUPLICATE", True)
-    assert len(import_files([tmp_path], parse_profile("[file]\nsample_rate_Hz = 200\n")).records) == 1
+    assert len(import_files([tmp_path], parse_profile("[file]\nsample_rate_Hz = 100\n")).records) == 1
 
 
 def test_a_text_of_the_same_name_states_the_current_of_its_record(tmp_path):
@@ -409,7 +409,7 @@ def test_minutes_of_one_digit_are_a_clock(tmp_path):
 def test_a_clock_named_after_each_channel_is_the_time_of_that_channel(tmp_path):
     channels = {"Force_N": force(0.5), "Stroke_mm": X, "Current_A": np.full(T.shape, 0.5)}
     clocks = {f"time_{name}": T for name in channels}
-    savemat(tmp_path / "a.mat", {**channels, **clocks, "Sample_rate": 200.0, "Start_time": "2023-04-12 09:11:00"})
+    savemat(tmp_path / "a.mat", {**channels, **clocks, "Sample_rate": 100.0, "Start_time": "2023-04-12 09:11:00"})
     expect(tmp_path, 0.5)
 
 
@@ -423,7 +423,7 @@ def test_rows_of_tables_beside_a_vector_of_currents_are_tests(tmp_path):
 @pytest.mark.parametrize("text", ["columns: time [s], displacement [mm], force [N]", ""])
 def test_matrices_whose_names_tell_no_channel_are_tests(tmp_path, text):
     tests = {
-        f"I{i}A".replace(".", "p"): np.column_stack([T, X, force(i)])[: 550 + 25 * n] for n, i in enumerate((0.0, 0.5))
+        f"I{i}A".replace(".", "p"): np.column_stack([T, X, force(i)])[: 250 + 25 * n] for n, i in enumerate((0.0, 0.5))
     }
     savemat(tmp_path / "all.mat", {**tests, "info": text})
     stated = "".join(
@@ -431,7 +431,7 @@ def test_matrices_whose_names_tell_no_channel_are_tests(tmp_path, text):
         for i, (role, unit) in enumerate({"time": "s", "displacement": "mm", "force": "N"}.items(), 1)
     )
     found = import_files([tmp_path], None if text else parse_profile(stated))
-    assert [(record.current[0], record.time.size) for record in found.records] == [(0.0, 550), (0.5, 575)]
+    assert [(record.current[0], record.time.size) for record in found.records] == [(0.0, 250), (0.5, 275)]
 
 
 def test_a_current_in_the_first_row_of_each_test_is_that_of_its_other_rows(tmp_path):
@@ -847,10 +847,10 @@ def test_the_day_of_a_test_is_that_of_its_own_lines(tmp_path, lines, note):
 @pytest.mark.parametrize(
     ("head", "scale"),
     [
-        (['"Sample Rate","200.000","Hz","","Duration","3.000","s"', "Time [s],Displacement [mm],Force [N]"], 1),
-        (["Sampling frequency: 200 Hz", "Time,Displacement [mm],Force [N]"], 1e3),
+        (['"Sample Rate","100.000","Hz","","Duration","3.000","s"', "Time [s],Displacement [mm],Force [N]"], 1),
+        (["Sampling frequency: 100 Hz", "Time,Displacement [mm],Force [N]"], 1e3),
         (["Time [s],Stroke (in.),Force [N]"], 1),
-        (["Logger 0.7, 200 SPS", "format: millis,displacement_mm,force_N"], 1e3),
+        (["Logger 0.7, 100 SPS", "format: millis,displacement_mm,force_N"], 1e3),
         (["Var1,Var2,Var3"], 1),
     ],
     ids=[
@@ -931,7 +931,7 @@ def test_rows_of_arrays_with_units_of_their_own_are_tests(tmp_path):
 
 @pytest.mark.parametrize("name", ["Time of day", "Uhrzeit"])
 def test_a_time_of_day_and_a_current_in_wide_letters_are_read(name, tmp_path):
-    rows = [f"11:59:{58 + t:06.3f} AM,{x:.4f},{f:.3f}" for t, x, f in zip(T[:360], X, force(0.5), strict=False)]
+    rows = [f"11:59:{58 + t:06.3f} AM,{x:.4f},{f:.3f}" for t, x, f in zip(T[:180], X, force(0.5), strict=False)]
     (tmp_path / "\uff10\uff0e\uff15\uff21.csv").write_text("\n".join([f"{name},Displacement [mm],Force [N]", *rows]))
     expect(tmp_path, 0.5)
 
@@ -944,7 +944,7 @@ def test_lists_in_a_json_file_name_columns_that_a_row_of_numbers_heads(tmp_path)
 
 
 def test_numbered_keys_may_begin_with_the_channel(tmp_path):
-    head = ["Ch1Name=Displacement", "Ch1Unit=mm", "Ch2Name=Load", "Ch2Unit=N", "SampleRate=200 Hz"]
+    head = ["Ch1Name=Displacement", "Ch1Unit=mm", "Ch2Name=Load", "Ch2Unit=N", "SampleRate=100 Hz"]
     table(tmp_path / "a_0.5A.dat", head, X, force(0.5))
     expect(tmp_path, 0.5)
 
@@ -1021,7 +1021,7 @@ def test_no_current_is_offered_by_another_resistance_or_voltage_or_above_those_o
 def test_a_label_alone_on_its_line_states_what_the_next_holds(tmp_path):
     """As SignalExpress exports: a step for each column, in seconds, and names of terminals that a text explains."""
     head = ["channel names: ", "0_Voltage - Dev1_ai0\t0_Voltage - Dev1_ai1\t", "start times: "]
-    head += ["01/09/2016 15:01:22.331\t01/09/2016 15:01:22.331\t", "dt: ", "0.005\t0.005\t", "data: "]
+    head += ["01/09/2016 15:01:22.331\t01/09/2016 15:01:22.331\t", "dt: ", "0.01\t0.01\t", "data: "]
     body = [f"{x / 5:.6f}\t{f / 500:.6f}\t" for x, f in zip(X, force(0.5), strict=True)]
     (tmp_path / "run1.txt").write_text("\n".join([*head, *body, ""]))
     note = tmp_path / "README.txt"
