@@ -1,5 +1,6 @@
 """The rig profile: checked, written and read back, and what it changes in a record."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -287,6 +288,20 @@ def test_the_profile_of_columns_that_the_samples_decide_on_names_those_of_the_fi
     saved = write(tmp_path, "rig.toml", profile_text(guess_profile(path)))
     assert load_profile(saved).channel("displacement").column == "Axial displacement [mm]"
     np.testing.assert_array_equal(read_run(path, saved).displacement, read_run(path).displacement)
+
+
+@pytest.mark.parametrize(("tests", "unit"), [(3, " [N]"), (3, ""), (2, " [N]")])
+def test_a_profile_of_columns_that_differ_between_the_tests_of_a_file_leaves_them_open(tests, unit, tmp_path):
+    names = ["t [s]", *(name for n in range(1, tests + 1) for name in (f"x{n} [mm]", f"F{n}{unit}"))]
+    columns = [rows()[:, :1], *(rows(seed=n)[:, 1:] for n in range(1, tests + 1))]
+    path = write(tmp_path, "in.csv", text(np.hstack(columns), (",".join(names),)))
+    written, _ = profile_template([path], Profile())
+    answered = re.sub(r"#unit = .*", 'unit = "N"', written.replace('#blocks = "split"', 'blocks = "split"'))
+    answered = re.sub(r'#"in_([0-9])" =', r'"in_\1" = 0.\1', answered.replace("#[current", "[current"))
+    records = import_files([path], parse_profile(answered)).records
+    assert [float(record.current[0]) for record in records] == [0.1, 0.2, 0.3][:tests]
+    for seed, record in enumerate(records, 1):
+        np.testing.assert_allclose(record.force, rows(seed=seed)[:, 2], rtol=0, atol=1e-5)
 
 
 @pytest.mark.parametrize("header", [(), ("time\tdisp\tforce\tcount",)])

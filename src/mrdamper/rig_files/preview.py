@@ -53,7 +53,11 @@ def guess_profile(path: str | Path, profile: Profile | str | Path | None = None)
     """
     profile = profile_of(profile)
     with raw_tables(path, profile.file) as tables:
-        table, channels = _guess_channels(tables, Path(path), profile)
+        (table, *others), channels = _guess_channels(tables, Path(path), profile)
+    numbered = [{*other.names, *map(other.number, range(len(other.names)))} for other in others]
+    for role, channel in channels.items():
+        if channel.column is not None and any(channel.column not in own for own in numbered):  # x1, x2, one a test
+            channels[role] = channel.model_copy(update={"column": profile.channel(role).column})
     of_file = {key: value for key, value in table.form.items() if key != "sheet" or len(tables) == 1}  # tests in others
     form = {**of_file, **profile.file.model_dump(exclude_defaults=True)}
     if not any(table.names):
@@ -77,7 +81,7 @@ def preview(path: str | Path, profile: Profile | str | Path | None = None) -> di
     """
     profile = profile_of(profile)
     with raw_tables(path, profile.file) as tables:
-        table, channels = _guess_channels(tables, Path(path), profile)
+        (table, *_), channels = _guess_channels(tables, Path(path), profile)
         cells, places = list[list[str]](), dict[str, dict[str, Any]]()
         for column in range(min(len(table.names), _MOST_SHOWN)):
             values, odd = table.try_read(column), [*table.odd[column : column + 1]]
@@ -96,14 +100,17 @@ def preview(path: str | Path, profile: Profile | str | Path | None = None) -> di
     return {"names": names, "units": units, "numbers": numbers, "rows": rows, "channels": places}
 
 
-def _guess_channels(tables: list[RawTable], path: Path, profile: Profile) -> tuple[RawTable, dict[str, Channel]]:
+def _guess_channels(tables: list[RawTable], path: Path, profile: Profile) -> tuple[list[RawTable], dict[str, Channel]]:
+    """Return the tables of the tests of a file, and the channels of the first."""
     tables = test_tables(described(tables, path, profile), profile)
     try:
-        table = tables_of_tests(tables, profile)[0][0]
+        tables = tables_of_tests(tables, profile)[0]
+        table = tables[0]
         places = {name: (entry.column, entry.unit) for name, entry in assign(table, profile).items()}
     except InputError:
-        table = tables[0]
-        places = {name: place for name, place in propose(table).items() if name not in profile.channels}
+        table, proposed = tables[0], propose(tables[0])
+        tables = [table, *(other for other in tables[1:] if propose(other).keys() == proposed.keys())]
+        places = {name: place for name, place in proposed.items() if name not in profile.channels}
     channels = {}
     for name, (column, unit) in places.items():
         says: dict[str, Any] = {"column": None, "unit": unit or None}
@@ -113,7 +120,7 @@ def _guess_channels(tables: list[RawTable], path: Path, profile: Profile) -> tup
             says |= {"sign": -1} if sign_of(table, profile, name) == -1 else {}
         stated = profile.channel(name).model_dump(exclude_unset=True, exclude_none=True)
         channels[name] = Channel(**{**says, **stated})
-    return table, channels
+    return tables, channels
 
 
 def tree_lines(paths: Iterable[str | Path], profile: Profile | str | Path | None = None) -> list[str]:

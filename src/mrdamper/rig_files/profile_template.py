@@ -13,7 +13,7 @@ from pathlib import Path
 from mrdamper.data.temporary import without_temporary_folder
 from mrdamper.errors import InputError
 from mrdamper.rig_files.coil_current import CURRENT_TOO
-from mrdamper.rig_files.column_names import Header
+from mrdamper.rig_files.column_names import SI, Header
 from mrdamper.rig_files.file_records import files_in, headings_of, unpacked
 from mrdamper.rig_files.mapping.companions import files_by_kind, with_files
 from mrdamper.rig_files.mapping.description import is_readme
@@ -25,6 +25,9 @@ from mrdamper.rig_files.rig_import import ImportResult, import_files, read_runs
 _OF_MOTION = re.compile(r"(?i)0[ _]?m?(?:hz|mm)|(?<![a-z])(?:f|freq|hz|a|amp|x|run|test|t|n|no|nr)[ _=-]*0")
 _COLUMN_OF_CURRENT = re.compile(r'\[channels\.current\] column = ("(?:[^"\\.]|\\.)(?:[^"\\]|\\.)*")')  # not "..."
 _OF_CURRENT = re.compile(r"(?i)(?<![a-z])(?:i|cur\w*|amps?|coil)[ _=-]*$")
+
+_MOST_ROUNDS = 3  # of questions that follow from answers
+_OF_COLUMNS = ("E_UNITS", "E_AMBIGUOUS", "E_COLUMN", "E_DUPLICATE_COLUMN")  # codes of questions
 
 _FORM = (
     'names = ["time [s]", "displacement [mm]", "force [N]"]  # of all columns, in order',
@@ -57,11 +60,33 @@ def profile_template(paths: Sequence[str | Path], profile: Profile) -> tuple[str
         except InputError as error:
             problems = getattr(error, "errors", (error,))
     refusals = import_files(paths, guess).refusals
-    taken = [channel.column for channel in guess.channels.values()]
-    unset = unset_keys([*problems, *(refusal.error for refusal in refusals)], columns, taken)
+    unset, names_tests = _open_keys(paths, guess, [*problems, *(r.error for r in refusals)], columns)
+    refusals = names_tests or refusals
     missing = _missing_currents(refusals if guess.current is None else (), columns)
     text = profile_text(guess, unset) + _alternatives(columns, {}) + missing
     return text, list(dict.fromkeys(map(str, problems)))
+
+
+def _open_keys(
+    paths: Sequence[str | Path], guess: Profile, errors: Sequence[InputError], columns: Mapping[int, str]
+) -> tuple[dict[str, list[str]], list[Refusal]]:
+    """Return the keys that are asked for, also once others are answered, and the tests without a current by then."""
+    unset, without = dict[str, list[str]](), list[Refusal]()
+    taken = [channel.column for channel in guess.channels.values()]
+    for _ in range(_MOST_ROUNDS):
+        asked = unset_keys(errors, columns, taken)
+        unset = {key: list(dict.fromkeys([*unset.get(key, ()), *asked.get(key, ())])) for key in {**unset, **asked}}
+        keys = {section: {line.partition(" ")[0] for line in lines} for section, lines in asked.items()}
+        units = [role for role in guess.channels if "unit" in keys.get(f"channels.{role}", ())]
+        si = {role: guess.channel(role).model_copy(update={"unit": SI[role], "scale": 1.0}) for role in units}
+        file = guess.file.model_copy(update={"blocks": "split"} if "blocks" in keys.get("file", ()) else {})
+        before, guess = guess, guess.model_copy(update={"channels": {**guess.channels, **si}, "file": file})
+        if guess == before:
+            break
+        refusals = import_files(paths, guess).refusals
+        without = [r for r in refusals if r.error.code == "E_CURRENT_MISSING"]
+        errors = [r.error for r in refusals if r.error.code.startswith(_OF_COLUMNS)]
+    return unset, without
 
 
 @contextlib.contextmanager
