@@ -522,7 +522,8 @@ def test_units_that_the_items_of_a_readme_give_its_columns(tmp_path, item, last)
     ],
 )
 def test_an_item_of_a_readme_about_something_else_gives_no_unit(tmp_path, item):
-    write(tmp_path, "t,x,F\n")
+    rows = "".join(f"{t:.3f},{x:.7f},{f:.6f}\n" for t, x, f in zip(T, X, force(0.5), strict=True))
+    (tmp_path / "m07.csv").write_text(f"t,x,F\n{rows}")
     (tmp_path / "README.md").write_text(f"t: time (s)\nx: displacement (mm)\n{item}\n")
     assert "E_UNITS_MISSING" in {refusal.error.code for refusal in import_files([tmp_path]).refusals}
 
@@ -1042,6 +1043,11 @@ def test_a_frequency_of_something_else_than_the_rows_is_no_sampling_rate(text, t
     found = import_files([tmp_path])
     assert not found.records
     assert found.refusals
+
+
+def test_a_sampling_rate_stands_beside_other_frequencies(tmp_path):
+    rows = "".join(f"{x:.7f},{f:.6f}\n" for x, f in zip(X, force(0.5), strict=True))
+    (tmp_path / "a_0.5A.csv").write_text("stroke [mm],load [N]\n" + rows)
     (tmp_path / "README.txt").write_text(
         "Camera. Temperature 23 C, sampling rate (all channels): 200 Hz (laser 9 kHz), filter 50 Hz"
     )
@@ -1125,17 +1131,23 @@ def test_columns_of_forces_state_their_current_behind_the_unit(at, tmp_path):
     require_the_tests(tmp_path)
 
 
-@pytest.mark.parametrize("factor", [1.0, 1000.0], ids=["s", "ms"])
 @pytest.mark.parametrize(
-    "text", ["scan rate 200 Hz", "DAQ: 200 scans per second", "0.2 kS/s, 8 mm", "Messrate: 200 Hz"]
+    ("text", "factor", "others"),
+    [
+        ("scan rate 200 Hz", 1.0, ["scan rate 700 Hz"]),
+        ("scan rate 200 Hz", 1000.0, ["scan rate 700 Hz", "filter 200 Hz"]),
+        ("DAQ: 200 scans per second", 1.0, ["DAQ: 700 scans per second"]),
+        ("0.2 kS/s, 8 mm", 1000.0, ["0.7 kS/s, 8 mm"]),
+        ("Messrate: 200 Hz", 1000.0, ["Messrate: 700 Hz"]),
+    ],
 )
-def test_a_rate_in_a_text_beside_gives_the_unit_of_time_and_another_rate_does_not(tmp_path, text, factor):
+def test_a_rate_in_a_text_beside_gives_the_unit_of_time_and_another_rate_does_not(tmp_path, text, factor, others):
     rows = "".join(f"{t:.6g},{x},{f}\n" for t, x, f in zip(factor * T, X, force(0.5), strict=True))
     (tmp_path / "a_0.5A.csv").write_text(f"Time,disp [mm],force [N]\n{rows}")
     (tmp_path / "README.txt").write_text(f"Damper bench\n{text}\n")
     (record,) = import_files([tmp_path]).records
     assert np.median(np.diff(record.time)) == pytest.approx(0.005, rel=1e-6)
-    for other in (text.replace("2", "7"), "filter 200 Hz"):
+    for other in others:
         (tmp_path / "README.txt").write_text(f"Damper bench\n{other}\n")
         assert [refusal.error.code for refusal in import_files([tmp_path]).refusals] == ["E_UNITS_MISSING"]
 
@@ -1178,6 +1190,12 @@ def test_a_list_of_currents_that_may_not_be_that_of_the_tests_is_asked_about(tmp
     assert "save each test as an array of its own, its current in its name" in str(refusal.error)
 
 
+def write_two(folder) -> None:
+    for number, amperes in enumerate((0.2, 0.9), 1):
+        rows = "".join(f"{t},{x},{f}\n" for t, x, f in zip(T, X, force(amperes), strict=True))
+        (folder / f"t{number}.csv").write_text(f"time [s],disp [mm],force [N]\n{rows}")
+
+
 @pytest.mark.parametrize(
     "text",
     [
@@ -1199,11 +1217,13 @@ def test_a_list_of_currents_that_may_not_be_that_of_the_tests_is_asked_about(tmp
     ],
 )
 def test_a_list_of_currents_of_something_else_than_the_tests_is_no_list_of_theirs(tmp_path, text):
-    for number, amperes in enumerate((0.2, 0.9), 1):
-        rows = "".join(f"{t},{x},{f}\n" for t, x, f in zip(T, X, force(amperes), strict=True))
-        (tmp_path / f"t{number}.csv").write_text(f"time [s],disp [mm],force [N]\n{rows}")
+    write_two(tmp_path)
     (tmp_path / "README.md").write_text(f"Damper bench\n{text}\n")
     assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} == {"E_CURRENT_MISSING"}
+
+
+def test_a_list_of_as_many_currents_is_that_of_the_tests_if_no_other_text_lists_more(tmp_path):
+    write_two(tmp_path)
     for line in (
         "Currents: 0.2 and 0.9 A",
         "- coil currents of the 2 tests: 0.2, 0.9 A.",

@@ -1326,16 +1326,20 @@ def test_a_plan_that_lacks_tests_is_named_with_them(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("heading", "cell"),
+    ("heading", "cell", "files"),
     [
-        ("Remark", "INVALID - plug came off, repeated as run 3"), ("Bemerkung", "abgebrochen"), ("note", "warm-up"),
-        ("valid", "no"), ("备注", "无效"), ("Status", "cancelled, oil leak"), ("Discard", "yes"), ("Include", "no"),
-        ("Valid", "0.0"), ("valid (1/0)", "0"), ("Remark", "repeat of run 1, aborted"),
-        ("Bemerkung", "ungueltig, Stecker lose"), ("remarks", "not valid, plug loose"), ("Notes", "run-in"),
-        ("Remarks", "repeat of the first run aborted"), ("Remarks", "repeat, first one aborted, aborted again"),
+        *((heading, cell, ["run_1", "run_2", "run_3"]) for heading, cell in (
+            ("Remark", "INVALID - plug came off, repeated as run 3"), ("Bemerkung", "abgebrochen"), ("note", "warm-up"),
+            ("valid", "no"), ("备注", "无效"), ("Status", "cancelled, oil leak"), ("Discard", "yes"), ("Include", "no"),
+            ("Valid", "0.0"), ("valid (1/0)", "0"), ("Remark", "repeat of run 1, aborted"),
+            ("Bemerkung", "ungueltig, Stecker lose"), ("remarks", "not valid, plug loose"), ("Notes", "run-in"),
+            ("Remarks", "repeat of the first run aborted"), ("Remarks", "repeat, first one aborted, aborted again"),
+        )),
+        *((heading, cell, ["a_0A", "b_0.5A", "c_0.5A"]) for heading, cell in (
+            ("Remark", "INVALID - plug came off, repeated as run 3"), ("Include", "no"), ("Valid", "0.0"),
+        )),
     ],
 )  # fmt: skip
-@pytest.mark.parametrize("files", [["run_1", "run_2", "run_3"], ["a_0A", "b_0.5A", "c_0.5A"]])
 def test_a_test_that_a_plan_calls_invalid_or_a_warm_up_is_asked_about(tmp_path, heading, cell, files):
     for i, name in enumerate(files):
         (tmp_path / f"{name}.csv").write_text("Time [s],disp [mm],force [N]\n" + rows(T, X, force(i / 4, i)))
@@ -1390,12 +1394,12 @@ def test_samples_of_a_current_over_time_are_no_plan(tmp_path):
     assert not import_files([tmp_path]).records
 
 
-@pytest.mark.parametrize("amplitude", ["Amplitude [mm]", "x_amp_mm"])
 @pytest.mark.parametrize(
-    ("frequencies", "amplitudes", "refused"),
+    ("frequencies", "amplitudes", "refused", "amplitude"),
     [
-        ([1, 2, 1], [10, 10, 5], False), ([1, 2, 1], [20, 20, 10], False), ([1, 1, 1], [10, 10, 5], True),
-        ([2, 1, 1], [10, 10, 5], True), ([1, 2, 1], [5, 10, 10], True),
+        ([1, 2, 1], [10, 10, 5], False, "x_amp_mm"), ([1, 2, 1], [20, 20, 10], False, "Amplitude [mm]"),
+        ([1, 1, 1], [10, 10, 5], True, "Amplitude [mm]"), ([2, 1, 1], [10, 10, 5], True, "Amplitude [mm]"),
+        ([1, 2, 1], [5, 10, 10], True, "Amplitude [mm]"), ([1, 2, 1], [5, 10, 10], True, "x_amp_mm"),
     ],
 )  # fmt: skip
 def test_a_plan_whose_rows_state_other_motions_gives_no_currents_until_they_are_answered(
@@ -1929,8 +1933,15 @@ def test_a_plan_in_a_workbook_may_merge_cells_or_repeat_by_ditto_marks(tmp_path,
     assert by_id(import_files([tmp_path])) == {"B-01": 0.25, "B-02": 0.25, "B-03": 0.5, "B-04": 0.5}
 
 
-@pytest.mark.parametrize("nodes", ["ns=4;s=Rig.Stroke,ns=4;s=Rig.Load", "ns=2;i=1042,ns=2;i=1043", "Stroke,Load"])
-@pytest.mark.parametrize("late", [0.0, 2e-4])
+@pytest.mark.parametrize(
+    ("nodes", "late"),
+    [
+        ("ns=4;s=Rig.Stroke,ns=4;s=Rig.Load", 0.0),
+        ("ns=4;s=Rig.Stroke,ns=4;s=Rig.Load", 2e-4),
+        ("ns=2;i=1042,ns=2;i=1043", 2e-4),
+        ("Stroke,Load", 0.0),
+    ],
+)
 def test_nodes_of_a_server_are_channels_with_the_units_of_a_list_or_of_a_profile(nodes, late, tmp_path):
     names = [node.strip() for node in nodes.split(",")]
     body = "".join(
