@@ -1,9 +1,10 @@
 """`python -m mutants`: plant faults, run the tests that execute them, print the survivors.
 
-The tests of a group are collected once and run once without a fault, which records the functions that each executes. A
-fault is then tried in a fork of that process, in which the changed code replaces that of the functions, by those tests
-alone, the fastest first, up to the first failure. First a fault that every test detects is planted; if it survives, the
-exit status is 2. The exit status is 0 if at most 5 % of the faults survive.
+Groups of tests run beside each other. The tests of a group are collected once and run once without a fault, which
+records the functions that each executes. A fault is then tried in a fork of that process, in which the changed code
+replaces that of the functions, by those tests alone, the fastest first, up to the first failure. First a fault that
+every test detects is planted; if it survives, the exit status is 2. The exit status is 0 if at most 5 % of the faults
+survive.
 """
 
 from __future__ import annotations
@@ -15,16 +16,18 @@ import signal
 import sys
 import time
 from collections import Counter
+from functools import partial
 from pathlib import Path
 
 from mutants.explained import reason
 from mutants.faults import SOURCE, Fault, faults_of
-from mutants.fork import in_fork
+from mutants.fork import in_fork, in_forks
 from mutants.groups import CERTAIN, CERTAIN_FAULT, GROUPS, Group
 
 ROOT = Path(__file__).parent.parent
 MOST = 0.05  # share of the faults that may survive
 PATIENCE = 2.0  # additional time of tests by a fault [s], beyond five times and the longest test
+UNCOLLECTED = ([], "the tests could not be collected")
 LIBRARIES = ("numpy", "scipy.optimize", "scipy.special", "scipy.signal", "scipy.stats", "polars", "matplotlib.figure",
              "pydantic", "typer.testing", "jinja2", "pytest")  # fmt: skip
 
@@ -51,15 +54,18 @@ def main() -> int:
     if why := _blind():
         print(why)
         return 2
+    tried: list[tuple[Group, list[Fault]]] = []
     survivors: list[Fault] = []
     planted: list[Fault] = []
     begin = time.perf_counter()
     for group in GROUPS:
         modules = [module for module in group.modules if given.only in module]
-        faults = [fault for module in modules for fault in _share(module, given.share, given.explained)]
-        if not faults:
-            continue
-        alive, why = _try_group(group, faults, given.jobs)
+        if faults := [fault for module in modules for fault in _share(module, given.share, given.explained)]:
+            tried.append((group, faults))
+    each = max(1, given.jobs // max(1, len(tried)))
+    answers = in_forks([partial(_try_group, group, faults, each) for group, faults in tried], given.jobs)
+    for (group, faults), answer in zip(tried, answers, strict=True):
+        alive, why = answer or UNCOLLECTED
         if why:
             print(f"{' '.join(group.tests)}: {why}")
             return 1
@@ -107,7 +113,7 @@ def _package(module: str) -> str:
 def _blind() -> str:
     """Reason why results are invalid, if the fault that must be detected was not; otherwise empty."""
     (fault,) = (f for f in faults_of(CERTAIN.modules[0]) if (f.text, f.change) == CERTAIN_FAULT)
-    alive, why = _try_group(CERTAIN, [fault], 1)
+    alive, why = in_fork(partial(_try_group, CERTAIN, [fault], 1)) or UNCOLLECTED
     if why:
         return f"{' '.join(CERTAIN.tests)}: {why}"
     if alive:
@@ -123,22 +129,18 @@ def _share(module: str, share: float, explained: bool) -> list[Fault]:
 
 def _try_group(group: Group, faults: list[Fault], jobs: int) -> tuple[list[Fault], str]:
     """Survivors among the faults of a group, or why they could not be tried; in a separate process."""
+    from mutants.trial import Trial
 
-    def work() -> tuple[list[Fault], str]:
-        from mutants.trial import Trial
+    trial = Trial(faults, jobs, PATIENCE, os.dup(2))
+    silent = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(silent, 1)
+    os.dup2(silent, 2)
+    import pytest
 
-        trial = Trial(faults, jobs, PATIENCE, os.dup(2))
-        silent = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(silent, 1)
-        os.dup2(silent, 2)
-        import pytest
-
-        plain = ["-q", "-m", "not slow", "-p", "no:cacheprovider", "-p", "no:xdist", "-p", "no:benchmark", "--tb=no"]
-        words = ["-k", " and ".join(f"not {word}" for word in group.without)] if group.without else []
-        pytest.main([*plain, *words, *group.tests], plugins=[trial])
-        return trial.survivors, trial.why
-
-    return in_fork(work) or ([], "the tests could not be collected")
+    plain = ["-q", "-m", "not slow", "-p", "no:cacheprovider", "-p", "no:xdist", "-p", "no:benchmark", "--tb=no"]
+    words = ["-k", " and ".join(f"not {word}" for word in group.without)] if group.without else []
+    pytest.main([*plain, *words, *group.tests], plugins=[trial])
+    return trial.survivors, trial.why
 
 
 if __name__ == "__main__":

@@ -119,7 +119,7 @@ class Trial:
 
     def _try_all(self, session: pytest.Session) -> None:
         begin, running = time.perf_counter(), dict[int, tuple[Fault, list[pytest.Item]]]()
-        for number, fault in enumerate(self.faults, 1):
+        for fault in self.faults:
             changed = _changed_code(fault)
             tests = self._answering(session, changed)
             if not tests:
@@ -131,10 +131,10 @@ class Trial:
             running[child] = fault, tests
             while len(running) >= self.jobs:
                 self._reap(running)
-            os.write(self.console, f"\r{number} of {len(self.faults)}, {time.perf_counter() - begin:.0f} s ".encode())
         while running:
             self._reap(running)
-        os.write(self.console, b"\n")
+        named = f"{self.faults[0].module}: {len(self.faults)} tried in {time.perf_counter() - begin:.0f} s\n"
+        os.write(self.console, named.encode())
 
     def _reap(self, running: dict[int, tuple[Fault, list[pytest.Item]]]) -> None:
         child, status = os.wait()
@@ -147,7 +147,7 @@ class Trial:
 
     def _survives(self, fault: Fault, why: str) -> None:
         self.survivors.append(fault)
-        text = f"\nsurvives: {fault.module}:{fault.line}: {fault.change} in {fault.of}: {fault.text} {why}\n"
+        text = f"survives: {fault.module}:{fault.line}: {fault.change} in {fault.of}: {fault.text} {why}\n"
         os.write(self.console, text.encode())
 
     def _noticed(
