@@ -13,6 +13,7 @@ from mrdamper.data import Floats
 from mrdamper.errors import ColumnError, CombinedError, InputError, UnitError, listed, printable
 from mrdamper.rig_files import column_names
 from mrdamper.rig_files.column_names import (
+    COMPUTED,
     DIMENSION,
     find_name,
     holds,
@@ -367,6 +368,8 @@ def _missing(table: RawTable, columns: Mapping[str, int], profile: Profile) -> l
     if (len(table.names) == 2 and len(missing) > 1) or {*columns} & {*SIGNED, "current"}:  # several files
         each = ', and file = "...{run}..." where each file has one channel,'
         fixed |= {role: fixed.get(role, "") + each for role in missing if role != "time"}
+    if computed := [name for name in table.names if holds(name, COMPUTED)]:
+        shown += f"; computed, not measured: {', '.join(computed)}"
     beside = f"(found {shown})"
     if "force" in missing and named_after_currents(table.names):
         fixed["force"] = '; or, if columns named after currents are the force at each, unit = "..." alone'

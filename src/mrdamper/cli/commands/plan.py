@@ -10,6 +10,9 @@ import typer
 from mrdamper.cli.progress import progress_soon
 from mrdamper.errors import InputError
 
+# Names of the force in motion files, which an import does not take for a measured one
+_COMPUTED = {"predicted_force_N": "of the model", "estimated_force_N": "from the rated force"}
+
 app = typer.Typer()
 
 
@@ -48,7 +51,7 @@ def plan(
     if about is not None and damper is None:
         raise InputError("--about without a model", remedy="give a model.json")
     allowed = Limits.read(limits) if limits else Limits.of(damper)  # type: ignore[arg-type]
-    forces = "the predicted force" if damper else "estimated from the rated force" if allowed.force_N else ""
+    heading = "predicted_force_N" if damper else "estimated_force_N" if allowed.force_N else ""
     rows = []
     with progress_soon("planning") as tell, write_result(out) as folder:
         if damper:
@@ -61,7 +64,7 @@ def plan(
             name = f"plan_{number:02d}_{c.current_A:.3g}A_{c.frequency_Hz:.3g}Hz_{1e3 * c.amplitude_m:.3g}mm.csv"
             motion, force = item.record(allowed, damper)
             columns = {"time_s": motion.time, "displacement_m": motion.displacement}
-            columns |= ({"force_N": force} if forces else {}) | {"current_A": motion.current}
+            columns |= ({heading: force} if heading else {}) | {"current_A": motion.current}
             table, names = np.column_stack(list(columns.values())), ",".join(columns)
             np.savetxt(folder / name, table, "%.9g", ",", header=names, comments="", encoding="utf-8")
             rows.append(asdict(PlanRow.of(number, item, name)))
@@ -70,7 +73,7 @@ def plan(
     minutes = sessions * allowed.opening + sum(item.minutes for item in chosen)
     typer.echo(
         f"{out / 'plan.csv'}\n{counted(len(chosen), 'record')} in {counted(sessions, 'session')}, {minutes:.0f} of "
-        f"{60 * hours:.0f} minutes" + (f"; force_N is {forces}" if forces else "")
+        f"{60 * hours:.0f} minutes" + (f"; {heading} is {_COMPUTED[heading]}" if heading else "")
     )
     if damper is None or reckoning is None:
         return
