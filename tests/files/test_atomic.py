@@ -42,7 +42,12 @@ def test_a_result_takes_the_place_of_the_earlier_one_and_files_of_others_stay(tm
     listed = publish(out, dict.fromkeys(["page", "model.json", "figures/b.svg"], "new"), record)
     assert [p.relative_to(out).as_posix() for p in listed] == ["page", "model.json", "figures/b.svg"]
     found = files(out)
-    written = {"files": ["figures/b.svg", "model.json", "page"], "seconds": {"in all": 1.5}, "processes": None}
+    written = {
+        "kind": "",
+        "files": ["figures/b.svg", "model.json", "page"],
+        "seconds": {"in all": 1.5},
+        "processes": None,
+    }
     assert json.loads(found.pop(MADE)) == written
     new = dict.fromkeys(["page", "model.json", "figures/b.svg"], "new")
     assert found == new | dict.fromkeys(["mine.txt", "figures/mine.svg"], "mine")
@@ -196,3 +201,22 @@ def test_a_shorter_plan_leaves_no_record_of_the_longer_one(tmp_path):
     records = [path.name for path in (tmp_path / "plan").glob("plan_*.csv")]
     assert records
     assert all(name in named for name in records)
+
+
+@pytest.mark.parametrize("earlier", [None, "compare", "study"])
+def test_a_result_is_put_into_no_folder_of_other_files(tmp_path, earlier):
+    if earlier is None:
+        (tmp_path / "test_1A.csv").write_text("time_s")
+    else:
+        publish(tmp_path, {"page": "old"}, ResultRecord(earlier))
+    before = files(tmp_path)
+    if earlier == "study":
+        require_writable(tmp_path, "study")
+        publish(tmp_path, {"page": "new"}, ResultRecord("study"))
+        assert files(tmp_path)["page"] == "new"
+        return
+    with pytest.raises(OutputError, match="exists already and is not empty"):
+        require_writable(tmp_path, "study")
+    with pytest.raises(OutputError, match="exists already"):
+        publish(tmp_path, {"page": "new"}, ResultRecord("study"))
+    assert files(tmp_path) == before

@@ -9,7 +9,7 @@ import pytest
 
 from mrdamper.dampers.model_file import load_model
 from mrdamper.data.atomic import MADE, write_result
-from mrdamper.errors import InputError
+from mrdamper.errors import InputError, OutputError
 from mrdamper.fleet.profile import load_fleet_profile
 from mrdamper.report.about import load_about, load_limits
 from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
@@ -56,9 +56,8 @@ def test_further_files_of_a_dataset_stay_inside_it(tmp_path):
 @pytest.mark.skipif(not Path("/dev/zero").exists(), reason="this system has no file without an end")
 def test_a_record_without_an_end_in_an_old_result_is_not_read(tmp_path):
     (tmp_path / MADE).symlink_to("/dev/zero")
-    with write_result(tmp_path) as work:
-        (work / "new.txt").write_text("new")
-    assert (tmp_path / "new.txt").read_text() == "new"
+    with pytest.raises(OutputError, match="exists already and is not empty"), write_result(tmp_path):
+        pass
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")

@@ -30,8 +30,9 @@ _REMEDY = "choose a folder you may write to"
 
 @dataclass(frozen=True)
 class ResultRecord:
-    """Contents of `made.json`: the files of a result, and its computing times."""
+    """Contents of `made.json`: the kind of a result, its files and its computing times."""
 
+    kind: str = ""  # name of the command that writes such results: study, compare, plan, ...
     files: tuple[str, ...] = ()  # paths relative to the folder, sorted
     # durations [s] by computation, or by rig and model
     seconds: Mapping[str, float | Mapping[str, float]] = field(default_factory=dict[str, float])
@@ -60,11 +61,11 @@ def write_folder(folder: str | Path, *, replace: bool = False) -> Generator[Path
             yield work
         return
     final = path_of(folder)
-    _require_absent(final)
+    require_free(final)
     with _beside(final) as work:
         yield work
         _sync(work)
-        _require_absent(final)
+        require_free(final)
         work.replace(final)
         _sync_entry(final.absolute().parent)
 
@@ -84,16 +85,19 @@ def write_result(folder: str | Path, record: ResultRecord | None = None) -> Gene
     """Give a temporary folder whose files replace an earlier result in one step when the block ends.
 
     Further files of the earlier result are removed; other files stay. `made.json` lists the files of a result, and
-    holds the durations and processes of a record. Raises `OutputError` if the folder cannot be made or written to.
+    holds the kind, durations and processes of a record. Raises `OutputError` if the folder cannot be made or written
+    to, or holds other files and no earlier result of the kind.
     """
-    final = Path(folder)
+    final, record = Path(folder), record or ResultRecord()
+    require_free(final, record.kind)
     with _beside(final) as work:
         yield work
         files = tuple(sorted(p.relative_to(work).as_posix() for p in work.rglob("*") if p.is_file()))
-        contents = asdict(replace(record or ResultRecord(), files=files))
+        contents = asdict(replace(record, files=files))
         (work / MADE).write_text(json.dumps(contents, indent=1) + "\n", encoding="utf-8")
         _sync(work)
-        _put(work, final, _earlier(final))
+        earlier = _earlier(final)
+        _put(work, final, frozenset(earlier.files if earlier else ()))
 
 
 def publish(folder: str | Path, files: Mapping[str, str | bytes], record: ResultRecord | None = None) -> list[Path]:
@@ -125,14 +129,35 @@ def write_file(path: str | Path) -> Generator[Path]:
         _sync_entry(final.absolute().parent)
 
 
-def require_writable(path: str | Path | None) -> None:
-    """Raise `OutputError`, before work begins, for a path that cannot be written to; None is no path."""
+def require_writable(path: str | Path | None, result: str | None = None) -> None:
+    """Raise `OutputError`, before work begins, for a path that cannot be written to; None is no path.
+
+    A folder for a kind of result must be free for it, as `require_free` decides.
+    """
+    if path is not None and result is not None:
+        require_free(path, result)
     if path is None or ((final := Path(path)).exists() and not final.is_dir() and not final.is_file()):
         return
     with _beside(final) as work:
         (work / "tried").write_bytes(b"\0")
     if final.exists() and not os.access(final, os.W_OK):
         raise OutputError("not writable", where=str(final), remedy=_REMEDY)
+
+
+def require_free(path: str | Path, kind: str | None = None, hint: str = "") -> None:
+    """Raise `OutputError` for a folder that is not empty, unless it holds an earlier result of a kind; or for a file.
+
+    A `hint` is appended to the remedy.
+    """
+    final = Path(path)
+    with _coded(final):
+        if not final.exists() or (final.is_dir() and not any(final.iterdir())):
+            return
+    earlier = _earlier(final)
+    if earlier is None or earlier.kind != kind:
+        other = f", a result of mrdamper {earlier.kind}" if earlier and earlier.kind else ""
+        remedy = f"choose another name or remove it{hint}"
+        raise OutputError(f"exists already and is not empty{other}", where=str(final), remedy=remedy)
 
 
 @contextmanager
@@ -167,22 +192,15 @@ def _coded(final: Path) -> Generator[None]:
         raise
 
 
-def _require_absent(final: Path) -> None:
-    if final.exists() and (not final.is_dir() or any(final.iterdir())):
-        raise OutputError(
-            "exists already and is not empty", where=str(final), remedy="choose another name or remove it"
-        )
-
-
-def _earlier(final: Path) -> frozenset[str]:
-    """Files of the present result."""
+def _earlier(final: Path) -> ResultRecord | None:
+    """Kind and files of the present result, if any."""
     if not (final / MADE).is_file():  # nothing, or a file without an end
-        return frozenset()
+        return None
     try:
-        files = json.loads((final / MADE).read_text(encoding="utf-8"))["files"]
-        return frozenset({MADE, *(str(name) for name in files)})
-    except (OSError, ValueError, TypeError, KeyError, RecursionError):
-        return frozenset()
+        contents = json.loads((final / MADE).read_text(encoding="utf-8"))
+        return ResultRecord(contents.get("kind", ""), (MADE, *(str(name) for name in contents["files"])))
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        return None
 
 
 def _put(work: Path, final: Path, stale: frozenset[str]) -> None:

@@ -68,7 +68,7 @@ def write_reproduction(
     every = tables | {"seconds": time_rows(study)}
     files = {"reproduction.html": page, **{f"tables/{name}.csv": csv_text(rows) for name, rows in every.items()}}
     took = {method.recipe.title: method.seconds for method in study.contenders}
-    record = ResultRecord(seconds={"in all": study.seconds, **took})
+    record = ResultRecord("reproduce", seconds={"in all": study.seconds, **took})
     written = publish(folder, {**files, **picture_files(shown)}, record)
     progress("written", 1.0)
     return written

@@ -52,7 +52,7 @@ def write_comparison(
         "comparison.json": json.dumps(rows, indent=1, ensure_ascii=False) + "\n",
     }
     took = {rig.dataset.name: {entry.recipe.name: entry.seconds for entry in rig.entries} for rig in comparison.rigs}
-    record = ResultRecord(seconds={"in all": comparison.seconds, **took}, processes=comparison.jobs)
+    record = ResultRecord("compare", seconds={"in all": comparison.seconds, **took}, processes=comparison.jobs)
     written = publish(folder, {**files, **models, **figures}, record)
     progress("written", 1.0)
     return written

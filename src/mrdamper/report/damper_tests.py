@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.data import Dataset, Run, same_motion
-from mrdamper.data.atomic import publish
+from mrdamper.data.atomic import ResultRecord, publish
 from mrdamper.data.encoding import csv_text
 from mrdamper.data.wording import counted, span
 from mrdamper.errors import IdentificationError, InputError
@@ -76,7 +76,7 @@ def write_test_report(
         "forces.csv": csv_text(force_rows(facts)),
         "tests.csv": csv_text(_test_rows(characteristics)),
     }
-    return publish(folder, {**files, **picture_files(pictures)})
+    return publish(folder, {**files, **picture_files(pictures)}, ResultRecord("report"))
 
 
 def figures_of_tests(

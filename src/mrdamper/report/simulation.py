@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from mrdamper.data.atomic import publish
+from mrdamper.data.atomic import ResultRecord, publish
 from mrdamper.data.encoding import csv_text, rows_of
 from mrdamper.data.wording import number
 from mrdamper.report.page import render_page
@@ -73,7 +73,7 @@ def write_simulation(
     every = slice(None, None, -(-done.time.size // _ROWS))
     samples = rows_of({name: column[every] for name, column in done.table.items()})
     files = {"simulation.html": page, "measures.csv": csv_text(rows), "histories.csv": csv_text(samples)}
-    return publish(folder, {**files, **picture_files(pictures)})
+    return publish(folder, {**files, **picture_files(pictures)}, ResultRecord("simulate"))
 
 
 def _readable(name: str) -> tuple[str, str, float]:

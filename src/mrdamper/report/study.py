@@ -97,7 +97,7 @@ def write_study(
     tables = _tables(study) | ({"forces": forces} if forces else {})
     files |= {f"{name}.csv": csv_text(rows) for name, rows in tables.items()}
     took = {rig.dataset.name: {c.recipe.name: c.seconds for c in rig.candidates} for rig in study.rigs}
-    written = publish(folder, files, ResultRecord(seconds={"in all": study.seconds, **took}))
+    written = publish(folder, files, ResultRecord("study", seconds={"in all": study.seconds, **took}))
     progress("written", 1.0)
     return written
 

@@ -52,7 +52,7 @@ def compare(
     from mrdamper.study import comparison as comparing
     from mrdamper.study.recipe import recipes, recipes_of_models, study_method
 
-    require_writable(out)
+    require_writable(out, "compare")
     names = recipes_of_models([name.strip() for entry in models for name in entry.split(",") if name.strip()])
     options = (parse_pairs(setting, "--set"), parse_gas(gas)) if setting or gas else ()
     method = study_method("paper", *options) if options else None

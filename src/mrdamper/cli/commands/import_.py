@@ -92,17 +92,14 @@ def import_(
 
 
 def _refuse_taken(out: Path | None, add: bool) -> None:
-    from mrdamper.data.atomic import require_writable
+    from mrdamper.data.atomic import require_free, require_writable
 
     if out is None:
         return
     if add and not (out / "runs.csv").is_file():
         raise OutputError("no dataset to add to", where=str(out), remedy="leave --add out to write a new one")
-    if not add and out.exists() and (not out.is_dir() or any(out.iterdir())):
-        hint = ", or add to it with --add" if (out / "runs.csv").is_file() else ""
-        raise OutputError(
-            "exists already and is not empty", where=str(out), remedy=f"choose another name or remove it{hint}"
-        )
+    if not add:
+        require_free(out, hint=", or add to it with --add" if (out / "runs.csv").is_file() else "")
     require_writable(out)
 
 

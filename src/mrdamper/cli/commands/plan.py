@@ -36,7 +36,7 @@ def plan(
 
     from mrdamper.dampers.model_file import load_model
     from mrdamper.data import Condition
-    from mrdamper.data.atomic import require_writable, write_result
+    from mrdamper.data.atomic import ResultRecord, require_writable, write_result
     from mrdamper.data.encoding import csv_text
     from mrdamper.data.wording import counted
     from mrdamper.study.first_matrix import first_matrix
@@ -44,7 +44,7 @@ def plan(
     from mrdamper.study.plan import least_informative_runs, plan_tests
     from mrdamper.study.proposal import PlanRow
 
-    require_writable(out)
+    require_writable(out, "plan")
     damper = load_model(model) if model else None
     if limits is None and damper is None:
         raise InputError("neither a model nor limits is given", remedy="give --limits limits.toml", code="E_LIMITS")
@@ -53,7 +53,7 @@ def plan(
     allowed = Limits.read(limits) if limits else Limits.of(damper)  # type: ignore[arg-type]
     heading = "predicted_force_N" if damper else "estimated_force_N" if allowed.force_N else ""
     rows = []
-    with progress_soon("planning") as tell, write_result(out) as folder:
+    with progress_soon("planning") as tell, write_result(out, ResultRecord("plan")) as folder:
         if damper:
             doubt = Condition.of_text(about) if about and "," in about else about
             chosen, reckoning = plan_tests(damper, allowed, hours, doubt, tell)

@@ -39,7 +39,7 @@ def report(
     ladder, page_size = parse_ladder(velocities), paper_size(paper)
     head = load_about(about) if about else None
     bands = load_limits(limits) if limits else ()
-    require_writable(out)
+    require_writable(out, "report")
     with progress_on_stderr() as progress:
         progress("reading", 0.0)
         loaded = dict(_specimen(text) for text in specimens)

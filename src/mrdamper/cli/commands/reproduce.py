@@ -51,7 +51,7 @@ def reproduce(
     from mrdamper.study.processes import several
     from mrdamper.study.recipe import study_method
 
-    require_writable(out)
+    require_writable(out, "reproduce")
     if gas is not None and data is None:
         raise InputError("--gas without --data: the virtual rig has its own gas spring", remedy="give --data DATASET")
     options = study_method("paper", parse_pairs(setting, "--set"), parse_gas(gas))

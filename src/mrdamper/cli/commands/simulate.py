@@ -94,7 +94,7 @@ def _refuse_no_folder(out: Path | None, compare: list[str] | None) -> None:
 
     if out is None and compare:
         raise InputError("--compare without --out", remedy="give a folder for the report")
-    require_writable(out)
+    require_writable(out, "simulate")
 
 
 def _facts(system: str, source: str, time_scale: float, damper: Path | str) -> dict[str, str]:

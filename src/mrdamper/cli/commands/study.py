@@ -63,7 +63,7 @@ def study(
     chosen = _model(model, gas, setting)
     head, bands = load_about(about) if about else None, load_limits(limits) if limits else ()
     also = [kind for kind, wanted in (("pdf", pdf or about is not None), ("png", png)) if wanted]
-    require_writable(out)
+    require_writable(out, "study")
     page_size = paper_size(paper)
     dataset = load_dataset(data)
     if lag:

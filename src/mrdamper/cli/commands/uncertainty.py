@@ -42,7 +42,7 @@ def uncertainty(
     student(level, 1.0)  # refuses an invalid level
     if steps < 10:
         raise InputError(f"--steps {steps}", remedy="give at least 10, usually some thousands")
-    require_writable(out)
+    require_writable(out, "uncertainty")
     damper = load_model(model)
     runs = []
     if damper.uncertainty is None or profile or samples:
@@ -74,7 +74,7 @@ def uncertainty(
 
 
 def _write(out: Path, rows: Rows, curves: list[LikelihoodProfile], drawn: Samples | None, level: float) -> None:
-    from mrdamper.data.atomic import publish
+    from mrdamper.data.atomic import ResultRecord, publish
     from mrdamper.data.encoding import csv_text
     from mrdamper.report.plots.style import picture_files, picture_of
     from mrdamper.report.plots.uncertainty import corner, profile_curves, quantiles
@@ -85,7 +85,7 @@ def _write(out: Path, rows: Rows, curves: list[LikelihoodProfile], drawn: Sample
     if drawn is not None:
         pictures["corner"] = picture_of(corner(drawn))
         tables["samples.csv"] = csv_text(quantiles(drawn, level))
-    publish(out, tables | picture_files(pictures, folder=""))
+    publish(out, tables | picture_files(pictures, folder=""), ResultRecord("uncertainty"))
 
 
 def _used(data: Path | None, rig: str) -> list[Run]:
