@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from itertools import takewhile
 
 from mrdamper.rig_files import column_names, conditions
@@ -28,6 +28,7 @@ from mrdamper.rig_files.text.tokens import looks_numeric
 
 _QUANTITY = re.compile(rf"({NUMBER.pattern})\s*(m?A)")
 WITHIN = "table of results"  # within the file of its tests: beginning of where their currents stand
+_LETTER = re.compile(r"[^\W\d_eE]")  # none in a line of samples
 _RULE = re.compile(r"[-=+|:\s]{3,}")  # below the names of columns
 _SUPPLY = re.compile(r"(?i)\b(?:power[ _-]?)?suppl(?:y|ied)\b|\bpsu\b")
 _FEWEST_ROWS = 2  # of a table of results
@@ -81,7 +82,7 @@ def _with_row_a_test(results: Results) -> Results:
 
 def _matrix_of_tests(lines: Sequence[str]) -> Results | None:
     """Return the tests whose names stand in columns headed by a current each: corner, 0 A, 0.5 A; FL, R41, R42."""
-    for at in [at for at, line in enumerate(lines) if len(currents_in(line)) > 1]:
+    for at in [at for at, line in enumerate(lines) if _LETTER.search(line) and len(currents_in(line)) > 1]:
         for heads, rows in rows_below_heads(lines[at:]):
             columns = conditions.named_after_currents(heads)
             body = takewhile(lambda row, own=columns: not any(row[i] and looks_numeric(row[i]) for i in own), rows)
@@ -185,26 +186,32 @@ def _last_lines(table: RawTable, shared: set[str]) -> list[str]:
 
 
 def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
-    wide = separator == "  "
-    split = [re.split(r" {2,}", line.strip()) if wide else cells_of(line, separator) for line in lines]
-    bare = [[c.strip('"').strip() for c in cells] for cells in split if not _RULE.fullmatch("".join(cells))]
-    rows = [*map(with_small_units, bare)]
-    for at, row in enumerate(rows):
-        if sum(map(bool, row)) < 2:  # most lines are one cell where another character separates them
+    lines = [line for line in lines if not _RULE.fullmatch(line.replace(separator, ""))]
+
+    @cache
+    def row_at(at: int) -> list[str]:
+        wide = separator == "  "
+        cells = re.split(r" {2,}", lines[at].strip()) if wide else cells_of(lines[at], separator)
+        return with_small_units([cell.strip('"').strip() for cell in cells])
+
+    for at in (at for at, line in enumerate(lines) if separator in line and _LETTER.search(line)):  # no samples
+        row = row_at(at)
+        if sum(map(bool, row)) < 2:
             continue
         columns = [i for i, cell in enumerate(row) if cell and not NUMBER.fullmatch(cell) and _is_current(cell)]
-        below = rows[at + 1] if at + 1 < len(rows) else []
+        below = row_at(at + 1) if at + 1 < len(lines) else []
         supply = [] if columns else [i for i, cell in enumerate(row) if _is_of_supply(cell, *below[i : i + 1])]
         columns = columns or supply or [i for i, cell in enumerate(row) if holds(cell, COIL) and cell.isalpha()]
         if not columns:
             continue
         below = at + 1
         unit = ""
-        if below < len(rows) and is_units(rows[below]) and not any(map(NUMBER.fullmatch, rows[below])):
-            unit = rows[below][columns[0]].strip("[]()") if columns[0] < len(rows[below]) else ""
+        second = row_at(below) if below < len(lines) else []
+        if second and is_units(second) and not any(map(NUMBER.fullmatch, second)):
+            unit = second[columns[0]].strip("[]()") if columns[0] < len(second) else ""
             below += 1
         body, pauses = [], []
-        for cells in rows[below:]:
+        for cells in map(row_at, range(below, len(lines))):
             cell = cells[columns[0]] if len(cells) > columns[0] else ""
             cells = [*cells, *[""] * (len(row) - len(cells))][: len(row)]
             if not cell and any(cells) and not any(map(NUMBER.fullmatch, cells[1:])):
