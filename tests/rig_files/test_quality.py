@@ -11,6 +11,7 @@ from support.rig_records import chirp_record, clean_record, codes_of, random_rec
 from mrdamper.physics.motion import analyse_motion
 from mrdamper.rig_files.quality import check_record
 from mrdamper.rig_files.quality.table import record_of
+from mrdamper.rig_files.quality.view import find_strokes
 from mrdamper.rig_files.record import Record
 
 
@@ -239,6 +240,16 @@ def test_drift_is_said(what, share, said):
         moved = share * along * (half if what == "mean" else record.displacement - centre)
         codes = codes_of(replace(record, displacement=record.displacement + moved))
         assert codes == (["W_DRIFT"] if said else []), seed
+
+
+def test_a_ramp_is_no_part_of_a_steady_motion_of_few_strokes():
+    turns = [0, 4.5, -17, 20, -20, 20, 4]  # [mm]: the cycles begin at the first 20
+    x = np.concatenate(
+        [(a + b) / 2 + (a - b) / 2 * np.cos(np.linspace(0, np.pi, 101))[:-1] for a, b in pairwise(turns)]
+    )
+    steady = find_strokes(0.005 * np.arange(x.size), x).steady
+    assert steady is not None
+    assert steady[0] == 300
 
 
 def test_cycles_that_differ_are_said(good):

@@ -418,6 +418,8 @@ def test_rows_of_tables_beside_a_vector_of_currents_are_tests(tmp_path):
     forces = np.array([force(current) for current in currents])
     np.savez(tmp_path / "a.npz", time_s=T, displacement_mm=np.tile(X, (3, 1)), force_N=forces, current_A=currents)
     expect(tmp_path, *currents)
+    np.savez(tmp_path / "a.npz", time_s=T, displacement_mm=np.tile(X, (3, 1)), force_N=forces)
+    assert [refusal.error.code for refusal in import_files([tmp_path]).refusals] == ["E_CURRENT_MISSING"] * 3
 
 
 @pytest.mark.parametrize("text", ["columns: time [s], displacement [mm], force [N]", ""])

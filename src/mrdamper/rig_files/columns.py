@@ -410,7 +410,8 @@ def _convert(table: RawTable, role: str, column: int, profile: Profile, asks_cur
     unit = channel.unit or header.unit
     unit = "degF" if role == "temperature" and (unit or column_names.unknown_unit(table.names[column])) == "F" else unit
     held = "velocity" if channel.integrate else role
-    uncalibrated = channel.scale is None and header.dimension not in (None, DIMENSION[held], "mass")  # V are no newtons
+    other = header.dimension not in (None, DIMENSION[held], "mass") and not currents_in(table.names[column])  # 0.5 A
+    uncalibrated = other and channel.scale is None  # volts are no newtons
     for text in (unit, header.unit) if uncalibrated else (unit,):
         problem = _unit_problem(table, held, column, text)
         if problem is not None:

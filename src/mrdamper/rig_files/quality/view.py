@@ -292,9 +292,9 @@ def _without_ramps(lengths: Floats, first: int, last: int) -> tuple[int, int]:
     """
     middle = np.median(lengths[first:last])
     usual = max(_RAMP * middle, 4 * np.median(np.abs(lengths[first:last] - middle)))
-    while last - first > 3 and abs(lengths[first] - middle) > usual:
+    while last - first > 2 and abs(lengths[first] - middle) > usual:
         first += 1
-    while last - first > 3 and abs(lengths[last - 1] - middle) > usual:
+    while last - first > 2 and abs(lengths[last - 1] - middle) > usual:
         last -= 1
     return first, last
 

@@ -157,8 +157,9 @@ def _of_one_test(key: str) -> str:
 def _tests_of_arrays(tree: Mapping[str, Any]) -> _Tests | None:
     """Return the tests of arrays over conditions and samples: force[current, frequency, time].
 
-    Two arrays or more, no two dimensions of one length, each but that of the samples with a vector of a condition.
-    The time may be the same for all or some conditions: time[frequency, sample].
+    Two arrays or more, no two dimensions of one length, each but that of the samples with a vector of a condition,
+    which displacement[test, sample] and force[test, sample] need not have. The time may be the same for all or some
+    conditions: time[frequency, sample].
     """
     numeric = _numeric(tree)
     shapes = {key: _shape(array) for key, array in numeric.items()}
@@ -173,7 +174,9 @@ def _tests_of_arrays(tree: Mapping[str, Any]) -> _Tests | None:
     clocks = {key: numeric[key] for key, own in shapes.items() if own == (samples,)}
     conditions = {own for own in shapes.values() if len(own) == 1 and own[0] in outer}
     others = [key for key, own in shapes.items() if key not in (*tables, *clocks) and own not in conditions]
-    if len(conditions) < len(outer) or others or len(tables) < 2:
+    whole = {split_name(key).role for key in tables if len(shapes[key]) == 2}
+    told = len(conditions) >= len(outer) or (len(outer) == 1 and {"displacement", "force"} <= whole)
+    if not told or others or len(tables) < 2:
         return None
     rows = []
     for key in tables:
