@@ -12,11 +12,11 @@ import numpy as np
 
 from mrdamper.data import Floats, held_current
 from mrdamper.errors import ColumnError
+from mrdamper.physics.motion.strokes import find_strokes, runs_of
 from mrdamper.rig_files.coil_current import as_data, constant
 from mrdamper.rig_files.column_names import is_called, words
 from mrdamper.rig_files.conditions import currents_in, motions_in
 from mrdamper.rig_files.profile import Profile
-from mrdamper.rig_files.quality.view import find_strokes, runs_of
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import OPTIONAL, Finding, Record, part_of_record, unique_names
 

@@ -11,11 +11,11 @@ import numpy as np
 from mrdamper.data import Floats, held_current
 from mrdamper.data.arrays import take
 from mrdamper.errors import QualityError
+from mrdamper.physics.motion.strokes import find_strokes
 from mrdamper.rig_files.coil_current import with_stated_current
 from mrdamper.rig_files.column_names import COMPUTED, TABLES, words, words_of
 from mrdamper.rig_files.profile import toml
 from mrdamper.rig_files.quality.motion import stated_motion
-from mrdamper.rig_files.quality.view import find_strokes
 from mrdamper.rig_files.record import Finding, Record
 
 _ALIKE = 0.1  # relative difference of frequency and amplitude within which two motions are one

@@ -13,10 +13,10 @@ from scipy.integrate import cumulative_trapezoid
 from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError, InputError
 from mrdamper.physics.motion.measured import smooth
+from mrdamper.physics.motion.strokes import find_strokes
 from mrdamper.rig_files.column_names import role_of, split_name
 from mrdamper.rig_files.columns import candidates_of, column_called
 from mrdamper.rig_files.conditions import BARE_RATE, CHOICE, motions_in, stated_rate
-from mrdamper.rig_files.quality.view import find_strokes
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import REQUIRED, Finding, Record
 

@@ -25,8 +25,9 @@ import numpy as np
 
 from mrdamper.data import Floats, once_per_run
 from mrdamper.data.wording import counted
+from mrdamper.physics.motion.strokes import runs_of
 from mrdamper.rig_files.quality.cycles import NOTED, POINTS, CycleChannel, percent, steady_cycles
-from mrdamper.rig_files.quality.view import View, runs_of, shown
+from mrdamper.rig_files.quality.view import View, shown
 from mrdamper.rig_files.record import Finding
 from mrdamper.statistics.peaks import sample_noise
 

@@ -10,9 +10,10 @@ from mrdamper.data import Floats, once_per_run
 from mrdamper.data.wording import number
 from mrdamper.errors import QualityError
 from mrdamper.identification.loop_analysis import damping_share as share_of_damping
+from mrdamper.physics.motion.strokes import longest_run
 from mrdamper.rig_files.quality.cycles import POINTS, every_cycle, steady_cycles
 from mrdamper.rig_files.quality.motion import LEAST_CYCLES, current_changes, cycles_of, steady_window
-from mrdamper.rig_files.quality.view import MOST_SAMPLES, View, longest_run
+from mrdamper.rig_files.quality.view import MOST_SAMPLES, View
 from mrdamper.rig_files.record import SIGNED, Finding, SteadyPart
 from mrdamper.statistics.peaks import sample_noise
 

@@ -10,8 +10,9 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.data.arrays import odd_steps
 from mrdamper.data.wording import counted, number
+from mrdamper.physics.motion.strokes import longest_run, runs_of
 from mrdamper.rig_files.quality.cycles import REFUSED, percent, steady_cycles
-from mrdamper.rig_files.quality.view import View, longest_run, runs_of
+from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import COARSE_CLOCK, Finding
 from mrdamper.statistics.peaks import sample_noise
 

@@ -8,9 +8,10 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.data.wording import counted
+from mrdamper.physics.motion.strokes import runs_of
 from mrdamper.rig_files.column_names import SI
 from mrdamper.rig_files.quality.samples import USED
-from mrdamper.rig_files.quality.view import View, runs_of, shown
+from mrdamper.rig_files.quality.view import View, shown
 from mrdamper.rig_files.record import Finding
 
 # Leading digits of the codes in use: 999, 9999, ..., 999.25, 9.91e37, and the ends of 16-, 24- and 32-bit counts.
