@@ -13,7 +13,7 @@ from mrdamper.errors import InputError, OutputError
 from mrdamper.fleet.profile import load_fleet_profile
 from mrdamper.report.about import load_about, load_limits
 from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
-from mrdamper.rig_files.dataset_samples import load_motion
+from mrdamper.rig_files.motion_file import load_motion
 from mrdamper.rig_files.profile import load_profile
 from mrdamper.rig_files.tests_table import load_tests
 from mrdamper.systems.inputs import load_input

@@ -20,7 +20,7 @@ from mrdamper.dampers.model_file import save_model
 from mrdamper.dampers.prediction import distance_from_tests
 from mrdamper.data import Condition
 from mrdamper.errors import ConditionError, InputError
-from mrdamper.rig_files.dataset_samples import load_motion
+from mrdamper.rig_files.motion_file import load_motion
 from mrdamper.study.first_matrix import first_matrix
 from mrdamper.study.limits import Limits
 from mrdamper.study.plan import ExperimentDesign, _slopes, _with_currents_between, least_informative_runs, plan_tests

@@ -22,10 +22,11 @@ from mrdamper.dampers.prediction import NOT_A_SINE, Prediction
 from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty, table
 from mrdamper.data import Condition, Displayable, Floats, Run
 from mrdamper.data.strict_text import STRICT
-from mrdamper.errors import InputError, validate_arguments
+from mrdamper.errors import InputError, require, validate_arguments
 from mrdamper.models.base import Model
 from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.physics.motion.sines import centred_motion, equivalent_sine, sine_condition
+from mrdamper.physics.motion.strokes import steady_part
 from mrdamper.physics.simulation import ForceLaw, Response, simulate, steady_loop
 from mrdamper.statistics.functions.forms import ParameterFunction
 from mrdamper.statistics.functions.motion_hull import MotionHull
@@ -201,6 +202,7 @@ class Damper(Displayable):
 
     def prediction_interval(self, prediction: Prediction, level: float = 0.9) -> Any:
         """Prediction intervals of a force that this damper predicted; see `mrdamper.dampers.bands.band`."""
+        require(prediction, Prediction, "a prediction", "give damper.predict(...) of the condition or motion")
         return import_module("mrdamper.dampers.bands").band(self, prediction, level)
 
     def score(self, runs: Iterable[Run]) -> Any:
@@ -252,9 +254,11 @@ class Damper(Displayable):
         Parameters
         ----------
         at : Condition, Run or Excitation
-            An excitation is a motion about mid-stroke, as `sine` and `sweep` return it. A motion in arrays is a run
-            with any force, ``Run("mine", time, displacement, np.zeros(time.size), current)`` in s, m, N and A; its
-            displacements count from their middle.
+            The displacements of an excitation count from mid-stroke, and are used as they are: with a stiffness, a
+            motion about another position has another mean force. A motion in arrays is
+            ``measured_motion(Run("mine", time, displacement, np.zeros(time.size), current))`` in s, m, N and A
+            (`mrdamper.physics.motion.measured_motion`). The displacement sensor of a recorded run may have its zero
+            anywhere, so those of a run count from their middle.
 
         Returns
         -------
@@ -266,7 +270,11 @@ class Damper(Displayable):
             loop = self.loop(at)
             return Prediction(loop.excitation, loop.force, at, self.envelope.flags(at), steady=True)
         if isinstance(at, Excitation):
-            run, motion = Run("excitation", at.time, at.displacement, np.zeros(len(at)), at.current), at
+            # Approach and return to rest would change the amplitude and the middle of the sine between them.
+            one_current, motion = np.ptp(at.current) <= SAME_CURRENT, at
+            steady = steady_part(at.time, at.displacement) if one_current else slice(None)
+            window = float(at.time[steady][0]), float(at.time[steady][-1])
+            run = Run("excitation", at.time, at.displacement, np.zeros(len(at)), at.current, window=window)
         else:
             run, motion = at, centred_motion(at)
         sine = equivalent_sine(run)

@@ -16,10 +16,12 @@ from mrdamper.data.runs import Floats
 from mrdamper.data.wording import number
 from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.physics.motion.made import sine
+from mrdamper.physics.motion.strokes import steady_part
 from mrdamper.statistics.metrics import peak_force
 
 NOT_A_SINE = "not a sine"
 _NO_DISTANCE = 1e-6  # from the hull of tested motions, by rounding
+_CUT = 0.02  # of a cycle, by which a cut at a sample shortens the last one
 _CYCLES, _SAMPLES = 2, 100  # of a sine from rest, and of each cycle: a steady loop may not close
 _OF_HULL, _OF_VELOCITY = 0.1, 0.3  # of the distance from it, and of the logarithm of the velocity over the nearest's
 
@@ -72,6 +74,17 @@ class Prediction(Displayable):
     def displacement(self) -> Floats:
         """(N,) of the motion [m]."""
         return self.motion.displacement
+
+    @property
+    def whole_cycles(self) -> slice | None:
+        """Samples of the last whole cycles of the steady sine; None if the motion has no cycles at one current."""
+        if self.steady:
+            return slice(0, self.time.size)
+        part = steady_part(self.time, self.displacement)
+        first, last = self.time[part][[0, -1]]
+        count = int((last - first) * self.condition.frequency_Hz + _CUT) if self.is_sine else 0
+        begin = float(last - count / self.condition.frequency_Hz) if count else 0.0
+        return slice(int(np.argmin(np.abs(self.time - begin))), part.stop) if count else None
 
     def corrected(self, gain: float, offset: float) -> Prediction:
         """Return the prediction with another gain and offset [N] of the force."""

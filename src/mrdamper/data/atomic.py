@@ -129,15 +129,18 @@ def write_file(path: str | Path) -> Generator[Path]:
         _sync_entry(final.absolute().parent)
 
 
-def require_writable(path: str | Path | None, result: str | None = None) -> None:
+def require_writable(path: str | Path | None, result: str | None = None, *, makes_folders: bool = True) -> None:
     """Raise `OutputError`, before work begins, for a path that cannot be written to; None is no path.
 
-    A folder for a kind of result must be free for it, as `require_free` decides.
+    A folder for a kind of result must be free for it, as `require_free` decides. Missing folders above it are made, or
+    else refused.
     """
     if path is not None and result is not None:
         require_free(path, result)
     if path is None or ((final := Path(path)).exists() and not final.is_dir() and not final.is_file()):
         return
+    if not makes_folders and not final.absolute().parent.exists():
+        raise OutputError("no such folder", where=str(final.parent), remedy="make it, or correct the path")
     with _beside(final) as work:
         (work / "tried").write_bytes(b"\0")
     if final.exists() and not os.access(final, os.W_OK):

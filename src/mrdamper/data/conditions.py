@@ -15,7 +15,7 @@ import numpy as np
 from mrdamper.errors import ConditionError, shown
 
 _MOST_CURRENT = 1e6  # largest current of a coil [A]
-_LONGEST = 2.0  # largest amplitude of a damper [m]; beyond, the unit is wrong
+LONGEST = 2.0  # largest amplitude of a damper [m]; beyond, the unit is wrong
 _SLOWEST, _FASTEST = 1e-100, 1e100  # [Hz]; beyond, times or accelerations of a cycle are not finite
 _SAME = 0.03  # frequencies and amplitudes this close are one condition of the test matrix
 _NO_NUMBERS = (type(None), str, bytes, complex, list, tuple, dict, set)
@@ -76,7 +76,7 @@ class Condition:
     def __post_init__(self) -> None:
         current, frequency, amplitude = self.current_A, self.frequency_Hz, self.amplitude_m
         floats = type(current) is type(frequency) is type(amplitude) is float
-        sized = floats and abs(current) <= _MOST_CURRENT and 0 <= amplitude <= _LONGEST
+        sized = floats and abs(current) <= _MOST_CURRENT and 0 <= amplitude <= LONGEST
         if sized and (not frequency or _SLOWEST <= frequency <= _FASTEST):
             return  # a study makes thousands of them
         # A traced model is evaluated at symbols, which have no size.
@@ -87,7 +87,7 @@ class Condition:
                 raise ConditionError(f"{name} is {shown(value)}", remedy="give a number, zero or more")
         if isinstance(self.current_A, Real) and abs(self.current_A) > _MOST_CURRENT:
             raise ConditionError(f"current is {shown(self.current_A)} A", remedy="give amperes: 500 mA are 0.5")
-        if isinstance(self.amplitude_m, Real) and self.amplitude_m > _LONGEST:
+        if isinstance(self.amplitude_m, Real) and self.amplitude_m > LONGEST:
             raise ConditionError(f"amplitude is {shown(self.amplitude_m)} m", remedy="give metres: 10 mm are 0.01")
         if isinstance(self.frequency_Hz, Real) and self.frequency_Hz and not _SLOWEST <= self.frequency_Hz <= _FASTEST:
             raise ConditionError(f"frequency is {shown(self.frequency_Hz)} Hz", remedy="give hertz; zero for none")

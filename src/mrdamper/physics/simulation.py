@@ -84,7 +84,7 @@ def simulate(model: ForceLaw, excitation: Excitation) -> Response:
         excitation, Excitation, "a motion", "mrdamper.physics.motion makes them: sine, sweep, triangle, random_motion"
     )
     if not _is_force_law(type(model)):
-        require(model, ForceLaw, "a model")
+        require(model, ForceLaw, "a model", "of a damper, damper.predict(motion) gives the force")
     if (respond := getattr(model.state, "response", None)) is not None:  # of a recorded state: both in one pass
         return Response(excitation, *respond(model, excitation))
     state = model.state(excitation)

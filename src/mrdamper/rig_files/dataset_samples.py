@@ -1,4 +1,4 @@
-"""The samples of a dataset: one table of all runs, read under bounds of size, ratio and memory; and a motion alone.
+"""The samples of a dataset: one table of all runs, read under bounds of size, ratio and memory.
 
 A Parquet file may crash its library, or hold far more than it weighs. It is read by the process
 that reads rig files of that kind, and only the columns a dataset knows ever leave it.
@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mrdamper.data import Floats, Run
-from mrdamper.data.wording import number
-from mrdamper.errors import ColumnError, DatasetError, RunError, UnitError
+from mrdamper.data import Floats
+from mrdamper.errors import ColumnError, DatasetError, UnitError
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.archive import opened
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, RigFileError, Source
@@ -34,7 +33,6 @@ _RATIO, _UNPACKED = 20, 2**28  # all columns together: so many times their file,
 _HEADER = 2**20  # bytes a line of names may have
 _UNIT = re.compile(r"^(time|displacement|force|current|velocity)[ _\[(]", re.IGNORECASE)
 Channels = dict[str, Floats]
-_NAMES = ("time_s", "displacement_m")
 
 
 def read_samples(folder: Path, *, trusted: bool = False) -> dict[str, Channels]:
@@ -145,39 +143,6 @@ def first_line(error: Exception) -> str:
     return (str(error).strip().splitlines() or [type(error).__name__])[0]
 
 
-def load_motion(path: str | Path, current: float | None = None) -> Run:
-    """Read a motion as a run without force: CSV with the columns time_s, displacement_m, optionally current_A.
-
-    A coil current [A] that is given for the whole motion wins over the column.
-
-    Raises `DatasetError` or `ColumnError` or `UnitError` or `RunError` if the file cannot be read, lacks a column, or
-    its samples do not make a motion.
-    """
-    path = Path(path)
-    table = read_table(path, "give a CSV with time_s and displacement_m")
-    wanted = [*_NAMES, *(["current_A"] if current is None and "current_A" in table.columns else [])]
-    columns = {name: _numbers(table, name, path) for name in wanted}
-    if current is None and "current_A" not in columns:
-        raise ColumnError("no current", where=str(path), remedy="give --current A, or a column current_A")
-    time = columns["time_s"]
-    steps = np.diff(time)
-    wide = steps > 5 * np.median(steps) if steps.size else np.zeros(0, dtype=bool)
-    if wide.any():
-        at = int(np.argmax(wide))
-        problem = f"a gap of {number(steps[at])} s after {time[at]:.6g} s"
-        remedy = "predict each part separately: the damper's state is unknown after a gap"
-        raise RunError(problem, where=str(path), remedy=remedy, code="E_TIME_GAP")
-    return Run(
-        id=path.stem,
-        time=time,
-        displacement=columns["displacement_m"],
-        force=np.zeros(table.height),
-        current=columns.get("current_A", np.array(current)),
-        excitation="motion",
-        notes={} if "current_A" in wanted or "current_A" not in table.columns else {"replaced": "the column current_A"},
-    )
-
-
 def read_table(path: Path, remedy: str) -> pl.DataFrame:
     """Read a small table from CSV, packed or not, within the bounds of a rig's file.
 
@@ -192,15 +157,3 @@ def read_table(path: Path, remedy: str) -> pl.DataFrame:
         raise DatasetError(error.found, where=str(path), remedy=error.remedy if path.is_file() else remedy) from error
     except (pl.exceptions.PolarsError, OSError) as error:
         raise DatasetError(first_line(error), where=str(path), remedy="write it as comma-separated UTF-8") from error
-
-
-def _numbers(table: pl.DataFrame, name: str, path: Path) -> Floats:
-    if name not in table.columns:
-        raise missing_column(name, table.columns, path)
-    values = table[name]
-    if not values.dtype.is_numeric():
-        refuse_text(name, path)
-    if values.null_count():
-        reason = f"column {name} has {values.null_count()} empty cells"
-        raise ColumnError(reason, where=str(path), remedy="remove those rows")
-    return values.to_numpy().astype(np.float64)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from mrdamper.cli.output import json_rows, put_figure, put_text
+from mrdamper.cli.output import figure_kind, json_rows, put_figure, put_text
 from mrdamper.errors import ConditionError, InputError
 
 if TYPE_CHECKING:
@@ -24,6 +24,8 @@ WARNINGS = {
     "sampling": "fewer than two samples within the yield displacement after a reversal; increase the sampling rate",
 }
 
+_OFF_CENTRE = 0.1  # of the peak-to-peak motion: distance of its middle from mid-stroke that is told
+
 app = typer.Typer()
 
 
@@ -33,7 +35,7 @@ def predict(
     current: float | None = typer.Option(None, help="Coil current [A]."),
     frequency: float | None = typer.Option(None, help="Frequency of a sine [Hz]."),
     amplitude: float | None = typer.Option(None, help="Amplitude of a sine [mm]."),
-    motion: Path | None = typer.Option(None, help="CSV with time_s, displacement_m and optionally current_A."),
+    motion: Path | None = typer.Option(None, help="CSV with time, displacement from mid-stroke, optionally current."),
     coil_lag: float | None = typer.Option(None, help="Time constant of the coil [ms]; default: the model's value."),
     check_run: list[str] = typer.Option([], help="Check run of --data: correct gain and offset for its test session."),
     data: Path | None = typer.Option(None, help="Dataset with the check runs; default: bundled tests."),
@@ -45,7 +47,10 @@ def predict(
     """Predict the force at a test condition or along a motion.
 
     The prediction interval of the peak force, the dissipated energy and the equivalent damping
-    are printed on standard error.
+    are printed on standard error; of a motion without cycles, its whole dissipated energy.
+
+    The columns of --motion have a name and a unit, such as time_s, displacement_m or
+    Displacement [mm], current_A. The displacement is used as it stands and counts from mid-stroke.
     """
     from mrdamper.dampers.bands import band, no_band, scope
     from mrdamper.data.atomic import require_writable
@@ -59,8 +64,10 @@ def predict(
         if value is not None and not 0 < value < math.inf:
             raise ConditionError(f"{name} {value:g}", remedy="give a positive number")
     student(level, 1.0)  # refuses an invalid level
-    require_writable(out)
-    require_writable(plot)
+    require_writable(out, makes_folders=False)
+    require_writable(plot, makes_folders=False)
+    if plot is not None:
+        figure_kind(plot)
     damper = _load(model, coil_lag)
     prediction = _predict(damper, motion, current, frequency, amplitude)
     asked = (prediction.motion, prediction.condition)
@@ -102,17 +109,24 @@ def _predict(
     damper: Damper, motion: Path | None, current: float | None, frequency: float | None, amplitude: float | None
 ) -> Prediction:
     """Predict along the motion of a file, or at a condition [A, Hz, mm]."""
+    import numpy as np
+
     from mrdamper.data import Condition
+    from mrdamper.data.wording import number
+    from mrdamper.physics.motion import measured_motion
 
     if motion is not None:
-        from mrdamper.rig_files.dataset_samples import load_motion
+        from mrdamper.rig_files.motion_file import load_motion
 
         if frequency is not None or amplitude is not None:
             raise InputError("--motion together with --frequency or --amplitude", remedy="give one of them")
         run = load_motion(motion, current)
         if replaced := run.notes.get("replaced"):
             typer.echo(f"note: --current {current:g} replaces {replaced} of {motion}", err=True)
-        return damper.predict(run)
+        lowest, highest = np.min(run.displacement), np.max(run.displacement)
+        if abs(middle := (lowest + highest) / 2) > _OFF_CENTRE * (highest - lowest):
+            typer.echo(f"note: the middle of the motion lies {number(1e3 * middle, 3)} mm from mid-stroke", err=True)
+        return damper.predict(measured_motion(run))
     if current is None or frequency is None or amplitude is None:
         raise InputError("no condition", remedy="give --current A --frequency Hz --amplitude mm, or --motion FILE")
     return damper.predict(Condition(current, frequency, 1e-3 * amplitude))
@@ -140,17 +154,27 @@ def _session_known(
 
 
 def _summary(prediction: Prediction, interval: Band | None) -> dict[str, tuple[float, float, float]]:
-    """Peak force, energy per cycle and equivalent damping, each with the ends of its interval, or NaN."""
+    """Peak force, energy per cycle and equivalent damping, each with the ends of its interval, or NaN.
+
+    A motion without cycles has the energy of the whole record instead, without an interval.
+    """
+    import numpy as np
+
     from mrdamper.statistics.metrics import dissipated_power, peak_force
 
-    motion, c = prediction.motion, prediction.condition
-    power = dissipated_power(prediction.force, motion.velocity, motion.time)
-    energy = power / c.frequency_Hz if c.frequency_Hz > 0 else math.nan  # of a cycle
+    motion, c, cycles = prediction.motion, prediction.condition, prediction.whole_cycles
+    inside = cycles or slice(None)
+    time = motion.time[inside]
+    power = dissipated_power(prediction.force[inside], motion.velocity[inside], time)
+    peak = (peak_force(prediction.force), *(interval.peak if interval else (math.nan, math.nan)))
+    if cycles is None:
+        return {"peak_force_N": peak, "dissipated_energy_J": (power * float(np.ptp(time)), math.nan, math.nan)}
+    energy = power / c.frequency_Hz
     # Of the linear damper with the same dissipation on this sine: C = E/(π ω X²).
-    damping = 2 * power / c.peak_velocity**2 if c.peak_velocity > 0 else math.nan
+    damping = 2 * power / c.peak_velocity**2
     low, high = (1 + share for share in interval.energy) if interval else (math.nan, math.nan)
     return {
-        "peak_force_N": (peak_force(prediction.force), *(interval.peak if interval else (math.nan, math.nan))),
+        "peak_force_N": peak,
         "energy_per_cycle_J": (energy, energy * low, energy * high),
         "equivalent_damping_N_s_per_m": (damping, damping * low, damping * high),
     }
@@ -159,12 +183,13 @@ def _summary(prediction: Prediction, interval: Band | None) -> dict[str, tuple[f
 def _in_words(summary: dict[str, tuple[float, float, float]], interval: Band | None, level: float, where: str) -> str:
     from mrdamper.data.wording import number, span
 
-    peak, energy, damping = summary.values()
-    lines = [
-        f"peak force (half the peak-to-peak force) {number(peak[0])} N",
-        f"dissipated energy {number(energy[0])} J per cycle",
-        f"equivalent damping {number(damping[0])} N s/m",
-    ]
+    peak, *others = summary.values()
+    lines = [f"peak force (half the peak-to-peak force) {number(peak[0])} N"]
+    if "dissipated_energy_J" in summary:
+        lines.append(f"dissipated energy {number(summary['dissipated_energy_J'][0])} J over the record")
+    else:
+        energy, damping = (value for value, _, _ in others)
+        lines += [f"dissipated energy {number(energy)} J per cycle", f"equivalent damping {number(damping)} N s/m"]
     if interval is None:
         return "\n".join(lines)
     parts = ", ".join(
@@ -177,7 +202,7 @@ def _in_words(summary: dict[str, tuple[float, float, float]], interval: Band | N
         corrected = f"; with gain and offset of the session corrected {span(*interval.known_session, 'N', 4, ' to ')}"
     ends = (
         f", {100 * level:g} % prediction interval {span(*peak[1:], 'N', 4, ' to ')} {where}{corrected}",
-        *(f" ({number(low)} to {number(high)})" for _, low, high in (energy, damping)),
+        *(f" ({number(low)} to {number(high)})" if math.isfinite(low) else "" for _, low, high in others),
     )
     lines = [line + end for line, end in zip(lines, ends, strict=True)]
     return "\n".join([*lines, f"standard deviation of the force: {parts}"])

@@ -386,11 +386,10 @@
     try {
       if (file.size > MOST_BYTES) throw new Unusable(`${number(file.size / 1e6)} MB; this page reads up to ${MOST_BYTES / 1e6} MB: thin or cut the record, or use mrdamper predict --motion`);
       const made = checked(table(await file.text()));
-      const { displacement, ...derived } = smooth(made.time, made.displacement);
-      const centre = displacement.reduce((sum, x) => sum + x, 0) / displacement.length;
-      motion = { ...made, ...derived, displacement: displacement.map((x) => x - centre) };
+      motion = { ...made, ...smooth(made.time, made.displacement) };
+      const middle = extremes(motion.displacement).reduce((sum, x) => sum + x, 0) / 2;
       $("back").hidden = false;
-      say("file-message", `${file.name.slice(0, 80)}: ${made.time.length} samples, displacement counted from its mean of ${number(1e3 * centre)} mm${made.current ? "" : ", current from the slider"}.`);
+      say("file-message", `${file.name.slice(0, 80)}: ${made.time.length} samples, its middle is ${number(1e3 * middle)} mm from mid-stroke${made.current ? "" : ", current from the slider"}.`);
       clearTimeout(later);
       draw();
     } catch (error) {
