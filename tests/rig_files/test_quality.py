@@ -9,9 +9,9 @@ from support import rig_detection as rig
 from support.rig_records import chirp_record, clean_record, codes_of, random_record, with_channel
 
 from mrdamper.physics.motion import analyse_motion
+from mrdamper.physics.motion.strokes import find_strokes
 from mrdamper.rig_files.quality import check_record
 from mrdamper.rig_files.quality.table import record_of
-from mrdamper.rig_files.quality.view import find_strokes
 from mrdamper.rig_files.record import Record
 
 
