@@ -298,8 +298,6 @@ def test_a_rest_before_or_behind_the_motion_is_no_part_of_its_cycles(rest):
 def test_reversals_are_the_peaks_that_stand_out_on_both_sides(seed):
     from scipy.signal import find_peaks
 
-    from mrdamper.physics.motion.strokes import find_strokes
-
     rng = np.random.default_rng(seed)
     time = np.linspace(0, 1, int(rng.integers(200, 3000)))
     motions = {

@@ -175,8 +175,8 @@ def _tests_of_arrays(tree: Mapping[str, Any]) -> _Tests | None:
     conditions = {own for own in shapes.values() if len(own) == 1 and own[0] in outer}
     others = [key for key, own in shapes.items() if key not in (*tables, *clocks) and own not in conditions]
     whole = {split_name(key).role for key in tables if len(shapes[key]) == 2}
-    told = len(conditions) >= len(outer) or (len(outer) == 1 and {"displacement", "force"} <= whole)
-    if not told or others or len(tables) < 2:
+    of_tests = len(conditions) >= len(outer) or (len(outer) == 1 and {"displacement", "force"} <= whole)
+    if not of_tests or others or len(tables) < 2:
         return None
     rows = []
     for key in tables:
