@@ -883,10 +883,15 @@ def test_a_column_that_a_profile_leaves_out_is_not_read(tmp_path):
     head = "time [s],stroke [mm],coil current [A],load [N]\n"
     (tmp_path / "a_0.5A.csv").write_text(head + rows(T, X, 0 * T + 0.012, force(0.5)))
     (refusal,) = import_files([tmp_path]).refusals
-    assert '[file] leave_out = ["its name"]' in str(refusal.error)
-    (record,) = import_files([tmp_path], parse_profile('[file]\nleave_out = ["coil current*"]')).records
-    assert currents([record]) == [0.5]
-    np.testing.assert_allclose(record.force, force(0.5), atol=0.01)
+    line = 'leave_out = ["coil current [A]"]'
+    assert f"[file] {line}" in str(refusal.error)
+    for stated in (line, line.replace("[A]", "*")):
+        (record,) = import_files([tmp_path], parse_profile(f"[file]\n{stated}")).records
+        assert currents([record]) == [0.5]
+        np.testing.assert_allclose(record.force, force(0.5), atol=0.01)
+    written, _ = profile_template([tmp_path], parse_profile(""))
+    answered = written.replace("#[current", "[current").replace('#"a_0.5A" =', '"a_0.5A" = 0.012')
+    assert currents(import_files([tmp_path], parse_profile(answered)).records) == [0.012]
     assert "load [N]" in record.provenance["columns"]
 
 

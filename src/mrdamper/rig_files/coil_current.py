@@ -32,9 +32,8 @@ _CALIBRATION = 'give its calibration, [channels.current] unit = "A" and scale (A
 _PROFILE = "profile"  # where a current stands
 OF_NAME = "file name", "the title"  # beginnings of where it stands in a name
 _DECIDE = "write the right one into tests.csv (--write-tests), or correct the one that is wrong"
-_CHANNEL_WRONG = (
-    'if the channel is wrong, set [channels.current] unit = "A" and scale in a profile, or leave its column out there: '
-    '[file] leave_out = ["its name"]'
+CHANNEL_RIGHT = (
+    "if the channel is right, write its current into tests.csv (--write-tests) or [current.values] of a profile"
 )
 _OF_ANOTHER = re.compile("(?i)shunt|bridge|brücke")  # resistance or voltage
 _LARGEST_MARKED, _MOST_MARKS = 64 * 2**20, 500  # bytes of a file in whose rows marks are looked for, and marks
@@ -68,7 +67,8 @@ def current_of(
     elif not statements and channel is None:
         lines = [line for line in table.remarks if line not in table.titles]
         statements = _set_points(table, rows) or conditions.stated_in_titles(lines) or _folders(table, path)
-    stated = _agreed(statements, channel, where)
+    names = [profile.channel("current").column, *(table.names[i] for i in table.columns("current"))]
+    stated = _agreed(statements, channel, where, str(next(filter(None, names), "")))
     if stated is not None and channel is None and all(s.whence.startswith("the line ") for s in statements):
         _refuse_contradicted_line(table, stated, rows, where)
     if stated is None or (channel is not None and not stated_by_profile):
@@ -92,8 +92,16 @@ def _refuse_contradicted_line(table: RawTable, stated: Statement, rows: slice, w
     raise ColumnError(printable(problem), where=where, remedy=remedy, code="E_CURRENT_CONTRADICTS")
 
 
-def _agreed(statements: list[Statement], channel: Floats | None, where: str) -> Statement | None:
-    """Return the first of statements that agree, also with the channel; None if there is none."""
+def _channel_wrong(column: str) -> str:
+    """Return what to do where a channel, by the name of its column, is not the coil's current."""
+    return (
+        'if the channel is wrong, set [channels.current] unit = "A" and scale in a profile, or leave its column out '
+        f"there: [file] leave_out = [{toml(column)}]"
+    )
+
+
+def _agreed(statements: list[Statement], channel: Floats | None, where: str, column: str) -> Statement | None:
+    """Return the first of statements that agree, also with the channel of a column; None if there is none."""
     if not statements:
         return None
     current, whence, others = statements[0].amperes, statements[0].whence, statements[1:]
@@ -110,7 +118,7 @@ def _agreed(statements: list[Statement], channel: Floats | None, where: str) -> 
             current, whence, against = over[0].amperes, over[0].whence, ["which is no coil current of a damper"]
     else:
         code, against = "E_CURRENT_CONTRADICTS", measured
-        remedy = f"if the channel is right, write its current into tests.csv (--write-tests); {_CHANNEL_WRONG}"
+        remedy = f"{CHANNEL_RIGHT}; {_channel_wrong(column)}"
     if not against:
         return statements[0]
     problem = f"{whence} gives {current:g} A, {against[0]}"
@@ -271,7 +279,8 @@ def _two_statements(record: Record, has: str, current: float, whence: str, where
     """Return the error for a stated current [A] where the record has another, told with its unit."""
     own = record.provenance.get("current_from", "")
     problem = printable(f"{whence} gives {current:g} A, {record.id} has {has} ({own or 'current channel'})")
-    remedy = _DECIDE if own else f"correct {whence}; {_CHANNEL_WRONG}"
+    column = re.search(r"\bcurrent = (.+?) in m?A\b", record.provenance.get("columns", ""))
+    remedy = _DECIDE if own else f"correct {whence}; {_channel_wrong(column[1] if column else 'its name')}"
     return ColumnError(problem, where=printable(where), remedy=remedy, code="E_CURRENT_CONTRADICTS")
 
 

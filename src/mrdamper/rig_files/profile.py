@@ -203,7 +203,8 @@ class Profile(Table):
     def leaves_out(self, *parts: str) -> bool:
         """Tell if a file or table of this name, behind those of its folders, or a test behind its file, is omitted."""
         names = {p: "/".join(parts[-1 - p.count("/") :]) for p in self.file.leave_out}
-        return any(fnmatchcase(name.casefold(), pattern.casefold()) for pattern, name in names.items())
+        texts = [(name.casefold(), pattern.casefold()) for pattern, name in names.items()]
+        return any(name == pattern or fnmatchcase(name, pattern) for name, pattern in texts)  # current [A] as it stands
 
     def channel(self, name: str) -> Channel:
         """Return the settings of a channel."""

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from mrdamper.data.temporary import without_temporary_folder
 from mrdamper.errors import InputError
-from mrdamper.rig_files.coil_current import CURRENT_TOO
+from mrdamper.rig_files.coil_current import CHANNEL_RIGHT, CURRENT_TOO
 from mrdamper.rig_files.column_names import SI, Header
 from mrdamper.rig_files.file_records import files_in, headings_of, unpacked
 from mrdamper.rig_files.mapping.companions import files_by_kind, with_files
@@ -62,6 +62,8 @@ def profile_template(paths: Sequence[str | Path], profile: Profile) -> tuple[str
     refusals = import_files(paths, guess).refusals
     unset, names_tests = _open_keys(paths, guess, [*problems, *(r.error for r in refusals)], columns)
     refusals = names_tests or refusals
+    if any(CHANNEL_RIGHT in refusal.error.remedy for refusal in refusals):
+        guess = guess.model_copy(update={"current": profile.current})  # the names' is wrong where the channel is right
     missing = _missing_currents(refusals if guess.current is None else (), columns)
     text = profile_text(guess, unset) + _alternatives(columns, {}) + missing
     return text, list(dict.fromkeys(map(str, problems)))
@@ -118,11 +120,14 @@ def _of_tests(refusals: Sequence[Refusal], kinds: Collection[str]) -> list[Refus
 
 def _missing_currents(refusals: Sequence[Refusal], columns: Mapping[int, str]) -> str:
     """List what a person fills in for tests without a current, as comments: their currents, or a column's scale."""
-    missing = [r for r in refusals if r.error.code == "E_CURRENT_MISSING" or CURRENT_TOO in r.error.remedy]
+    asked = [r for r in refusals if CURRENT_TOO in r.error.remedy]  # beside units
+    missing = [
+        r for r in refusals if r.error.code == "E_CURRENT_MISSING" or CHANNEL_RIGHT in r.error.remedy or r in asked
+    ]
     if not missing:
         return ""
     lines = []
-    reasons = ["" if r.error.code != "E_CURRENT_MISSING" else r.error.found for r in missing]  # else of units
+    reasons = ["" if r in asked else r.error.found for r in missing]
     named = chain.from_iterable(_COLUMN_OF_CURRENT.findall(r.error.remedy) for r in missing)
     refused = (toml(name) for name in columns.values() if name and any(f"column {name!r}" in why for why in reasons))
     if shown := next(chain(named, refused), None):
@@ -131,9 +136,9 @@ def _missing_currents(refusals: Sequence[Refusal], columns: Mapping[int, str]) -
     runs = [r.run or Path(r.file).stem for r in missing]
     paths = [escape("/".join(Path(r.file).parts[-2:]).replace(": ", "/")) for r in missing]
     names = [escape(run) if runs.count(run) == 1 else f"*/{path}" for run, path in zip(runs, paths, strict=True)]
-    heading = '# Tests without a current: remove the #, write each current [A] behind its =, or "*" = ... for all:'
+    heading = '# Tests without a current, or with two: remove the #, write it [A] behind each =, or "*" = ... for all:'
     lines += [heading, "#[current.values]"]
-    own = len(set(reasons)) > 1  # one reason of all tests stands in their refusal
+    own = len({*reasons}) > 1  # one reason of all tests stands in their refusal
     whys = [f"  # {text}" if own and text and not text.startswith("no coil current") else "" for text in reasons]
     stated = dict(zip(_by_level(names), whys, strict=True))
     lines += [f"#{toml(name)} ={why}" for name, why in stated.items()]
