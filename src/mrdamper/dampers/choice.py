@@ -138,7 +138,7 @@ def _conclude(
     """Return the selected model, or the full one where fits do not confirm the step that selected it."""
     left_out, before = (CrossValidation.of(*each).everything() for each in (selected, full))
     final, best = selected if smaller_wins(left_out, before) else full
-    best = final.fit(start=best.point, rounds=1, settled=_COARSE_TOLERANCE / 10, to_the_last_digit=True)
+    best = final.fit(start=best.point, settled=_COARSE_TOLERANCE / 10, to_the_last_digit=True)
     evidence = CrossValidation.of(final, best, sessions=True)
     means = _means(dict(sorted({**evidence.everything(), **current}.items())))
     about = {**best.damper.provenance, "terms": terms}

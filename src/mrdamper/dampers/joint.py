@@ -313,8 +313,8 @@ class JointProblem:
 
         The search begins at `start` (D,) on the search axes, for example the result of a fit to more runs. It has some
         rounds of robust weights, and steps in each, and ends at a relative gain of a step, `settled`; below the default
-        its curvature is estimated, too. `to_the_last_digit`: continue until the gradient vanishes, so that the result
-        does not depend on rounding.
+        its curvature is estimated, too. The weights of the first round are equal. `to_the_last_digit`: continue every
+        round until the gradient vanishes, so that the result does not depend on rounding.
         """
         begin = time.perf_counter()
         parts = self.parts if rows is None else [self.parts[i] for i in rows]
@@ -334,14 +334,14 @@ class JointProblem:
     ) -> JointFit:
         """Search in rounds, with weights by the errors the last one left."""
         ending, curved = StopReason.SOLVED, settled < _SEARCH_TOLERANCE
-        for left in reversed(range(rounds)):
+        for _ in range(rounds):
             if self.space.axes:
                 solution = least_squares(
                     table.solved_residual, point, *self.space.box(), most_steps, settled,
                     products=table.products, curved=curved, lengthened=True,
                 )  # fmt: skip
                 point, ending = solution.point, solution.ending
-                if to_the_last_digit and not left:
+                if to_the_last_digit:
                     point = newton_refine(table.gradient, point, *self.space.box(), table.gradient)
             table.weigh(table.solve(point).nrmse_pp)
         solved = table.solve(point)
