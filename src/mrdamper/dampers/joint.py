@@ -69,9 +69,8 @@ class JointDamper(Damper):
 
     @property
     def parameter_count(self) -> int:
-        """Number of parameters from the tests of this damper, and of active presets, which are from other dampers."""
-        held = [info.name for info in self.model.parameters() if info.preset and info.name not in self.free]
-        return len(self.free) + sum(getattr(self.model, name) != 0 for name in held)
+        """Number of parameters determined from the tests; a preset, which is of other dampers, is none of them."""
+        return len(self.free)
 
     @property
     def yield_length(self) -> float | None:
