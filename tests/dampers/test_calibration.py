@@ -229,7 +229,9 @@ def test_few_units_reach_a_lower_level_and_say_so():
     found = calibrated([scored(1.0, peak=p) for p in (1.0, 2.0, 3.0, 4.0)])
     assert found.reachable == found.level == pytest.approx(0.8)
     assert found.summary.startswith("80 % prediction intervals covered")
-    assert found.summary.endswith("of 4 cross-validated runs; 90 % requires 9 independent runs")
+    assert found.summary.endswith(
+        "of 4 cross-validated runs (conditions omitted, not currents); 90 % requires 9 independent runs"
+    )
     assert found.factor("peak", 0.99) == found.factor("peak", 0.8) == pytest.approx(4 / ndtri(0.9))
     assert replace(found, peak=()).factor("peak", 0.9) == 1.0
     many = calibrated([scored(1.0, peak=p) for p in np.arange(1.0, 40)])

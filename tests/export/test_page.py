@@ -189,7 +189,9 @@ def test_beyond_the_tests_curves_are_dashed_and_said_so(opened, no_compiler):
 def test_a_band_is_shaded_where_it_was_tested_and_nowhere_else(opened, no_compiler):
     truth = joint_damper()
     page = opened(estimate_uncertainty(truth, session_runs(truth)))
-    assert "Shaded: 90 % prediction interval of the force" in page.locator("main").inner_text()
+    text = page.locator("main").inner_text()
+    assert "Shaded: 90 % prediction interval of the force" in text
+    assert "at untested conditions the widest inside the tested ranges" in text
     assert page.locator("#over-displacement path.band, #over-velocity path.band").count() == 2
     assert re.search(r"extension\s+[\d,.]+ ± [\d,.]+ N", page.locator("#numbers").inner_text())
     put(page, frequency=6.0)

@@ -323,7 +323,7 @@ class Calibration:
             f"{number(100 * self.level, 3)} % prediction intervals covered {force} of the samples, "
             f"{peak} of the peak forces and {energy} of the energies of "
             + counted(self.units, f"cross-validated {self.unit}")
-            + few
+            + f" (conditions omitted, not currents){few}"
         )
 
     def factor(self, quantity: Quantity, level: float) -> float:

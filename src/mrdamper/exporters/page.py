@@ -137,7 +137,8 @@ def _words(damper: Damper | Model, stepping: Stream) -> list[str]:
             sentences.append(_FUNCTIONS if of_motion else "Its parameters are functions of the current.")
         if stepping.band is not None:
             sentences.append(
-                f"Shaded: {100 * stepping.band.level:g} % prediction interval of the force {stepping.band.scope}."
+                f"Shaded: {100 * stepping.band.level:g} % prediction interval of the force {stepping.band.scope}; at "
+                "untested conditions the widest inside the tested ranges."
             )
     else:
         sentences.append("A model that was not identified from tests.")
