@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from dataclasses import replace
 from html.parser import HTMLParser
 
@@ -125,6 +126,31 @@ def test_tables_carry_units_and_numbers(written):
     assert len(known) > 20
     assert all(float(row["low_95"]) < float(row["value"]) < float(row["high_95"]) for row in known)
     assert all(float(row["low_cv"]) <= float(row["high_cv"]) for row in known)
+
+
+def test_the_figures_of_a_report_agree(written, bundled_study):
+    """Mean errors, numbers of parameters, their ranges and the scatter have one value in page, tables and model."""
+    validation, parameters = (
+        list(csv.DictReader((written / f"{name}.csv").read_text(encoding="utf-8").splitlines()))
+        for name in ("validation", "parameters")
+    )
+    page = " ".join(re.sub(r"<[^>]+>", " ", (written / "report.html").read_text(encoding="utf-8")).split())
+    for rig in bundled_study.rigs:
+        model = json.loads((written / f"model-{rig.rig}.json").read_text(encoding="utf-8"))
+        errors = [
+            abs(float(row["nrmse_pp"]))
+            for row in validation
+            if (row["rig"], row["model"], row["set"]) == (rig.rig, rig.chosen.recipe.name, "cross-validation")
+        ]
+        mean = f"{100 * np.mean(errors):.2f} %"
+        assert model["provenance"]["cross-validation, condition"] == mean
+        assert f"condition {mean}, current" in page
+        rows = [row for row in parameters if row["rig"] == rig.rig]
+        assert len(rows) == len(model["damper"]["free"]) == rig.damper.parameter_count
+        assert f"{rig.chosen.title}, {len(rows)} parameters" in page
+        assert all(float(row["low_cv"]) <= float(row["value"]) <= float(row["high_cv"]) for row in rows)
+        assert f"{100 * model['covariance']['runs']['gain']:.1f} % and" in page
+    assert "over conditions, currents and fastest motions: play" in page  # of the rig with two sessions
 
 
 class _Links(HTMLParser):

@@ -142,7 +142,6 @@ def _conclude(
     evidence = CrossValidation.of(final, best, sessions=True)
     means = _means(dict(sorted({**evidence.everything(), **current}.items())))
     about = {**best.damper.provenance, "terms": terms}
-    about |= {f"cross-validation, {what}": f"{100 * error:.2f} %" for what, error in means.items()}
     best = replace(best, damper=replace(best.damper, provenance=about), second=second)
     return JointChoice(final, best, tried, means)
 

@@ -41,6 +41,7 @@ from mrdamper.report.plots.rig_tests import measured_loops, test_analysis, test_
 from mrdamper.report.plots.style import MOST_NAMED, Picture, picture_files, picture_of, powered
 from mrdamper.report.summary import error_sentence, omission_lines
 from mrdamper.report.tables import identification_rows, score_rows
+from mrdamper.study.cross_validation import NO_CURRENT
 from mrdamper.study.processes import IN_PROCESS, Processes
 from mrdamper.study.recipe import RecipeResult
 from mrdamper.study.workflow import RigStudy, Study
@@ -252,30 +253,29 @@ def _parameter_rows(study: Study) -> list[dict[str, Any]]:
 
 
 def _scatter(rig: RigStudy) -> str:
-    gain, offset = (float(np.std([getattr(one, name) for one in rig.readings])) for name in ("gain", "offset"))
-    error = rig.session_known
-    unknown = isinstance(error, str)
-    sessions = f", which are not known ({error})." if unknown else f"; without them the median is {100 * error:.2f} %."
-    omitted = "".join(
-        f"Mean error with a {name.removeprefix('cross-validation, ')} omitted in cross-validation: {value}. "
-        for name, value in rig.damper.provenance.items()
-        if name.startswith("cross-validation, ")
-    )
-    return omitted + (
-        f"Scatter between runs: gain {100 * gain:.1f} %, offset {offset:.0f} N (standard deviations of "
-        "measured over predicted force). The cross-validated errors include the differences between test sessions"
-        + sessions
-        + (f" {rig.calibration.summary}." if rig.calibration else "")
-    )
+    """State the mean errors by kind of fold, the scatter of gains and offsets, and the coverage of the intervals."""
+    kinds = {name.partition("cross-validation, ")[2]: value for name, value in rig.damper.provenance.items()}
+    means = ", ".join(f"{kind} {value}" for kind, value in kinds.items() if kind)
+    sentences = [f"Mean error in cross-validation by what is omitted: {means}."] if means else []
+    if uncertainty := rig.damper.uncertainty:
+        of_runs = f"between runs{' of one session' * uncertainty.of_sessions}"
+        scatter = {of_runs: (uncertainty.run_gain, uncertainty.run_offset)}
+        if uncertainty.of_sessions:
+            scatter = {"between sessions": (uncertainty.gain, uncertainty.offset), **scatter}
+        parts = ", ".join(f"{place} {100 * gain:.1f} % and {offset:.0f} N" for place, (gain, offset) in scatter.items())
+        sentences.append(f"Standard deviations of the gain and the offset of measured over predicted force: {parts}.")
+    if any(score.predicted and score.predicted.session for score in rig.chosen.cross_validated.runs):
+        error = rig.session_known
+        rest = f", which are not known ({error})" if isinstance(error, str) else f"; without them {100 * error:.2f} %"
+        sentences.append(f"The cross-validated median error includes the differences between test sessions{rest}.")
+    return " ".join([*sentences, *([f"{rig.calibration.summary}."] if rig.calibration else [])])
 
 
 def _choice(rig: RigStudy) -> str:
     chosen, others = rig.candidates[0], rig.candidates[1:]
-    reason = (
-        "Chosen by the user"
-        if rig.asked_for
-        else "Chosen by cross-validation over conditions, currents, fastest motions and sessions"
-    )
+    kinds = [kind if kind.endswith("s") else f"{kind}s" for kind in rig.folds[0] if kind != NO_CURRENT]
+    over = " and ".join([*filter(None, [", ".join(kinds[:-1])]), *kinds[-1:]])
+    reason = "Chosen by the user" if rig.asked_for else f"Chosen by cross-validation over {over}"
     text = (
         f"{reason}: {chosen.title}, {chosen.damper.parameter_count} parameters, "
         f"error {100 * chosen.cross_validated.median():.1f} %"

@@ -61,8 +61,9 @@ def error_sentence(rig: RigStudy) -> str:
     intervals = check_intervals(rig)
     if intervals is None:
         return text + "."
+    future = " in a future test session" if rig.damper.uncertainty and rig.damper.uncertainty.of_sessions else ""
     return text + (
-        f"; the {100 * LEVEL:.0f} % prediction interval of the peak force in a future test session is "
+        f"; the {100 * LEVEL:.0f} % prediction interval of the peak force{future} is "
         f"±{100 * intervals.half_width:.0f} %, and {intervals.inside} of the {intervals.runs} measured peak forces "
         "lie inside it."
     )

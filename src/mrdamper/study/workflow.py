@@ -125,7 +125,10 @@ class RigStudy(Displayable):
 
     @property
     def readings(self) -> list[GainOffset]:
-        """Gain and offset of every identification run against the chosen damper; no score is corrected by them."""
+        """Gain and offset of every identification run against the chosen damper; no score is corrected by them.
+
+        They contain the scatter between sessions and that between runs, less what the parameters compensate for.
+        """
         scores = (*self.chosen.cross_validated.runs, *self.chosen.train.runs)  # those of the damper itself come last
         return list({score.run_id: score.reading for score in scores if score.reading}.values())
 
@@ -286,7 +289,7 @@ def study_rig(
     candidates = _chosen_first(candidates, eligible)
     fitted = [dataset[one.run_id] for one in candidates[0].identifications]
     chosen = _with_uncertainty(candidates[0], fitted or everything)
-    candidates[0], sessions_note = _with_sessions(chosen, dataset)
+    candidates[0], sessions_note = _with_sessions(_with_errors(chosen), dataset)
     impossible |= unphysical
     return RigStudy(
         rig, dataset, loops, dynamic_ranges(loops), tuple(candidates), runs.not_identified, impossible,
@@ -342,6 +345,17 @@ def _with_uncertainty(chosen: RecipeResult, taken: Sequence[Run]) -> RecipeResul
     )
     damper = estimate_uncertainty(chosen.damper, taken, beside, held, away=away, other_sessions=other_sessions)
     return replace(chosen, damper=damper)
+
+
+def _with_errors(chosen: RecipeResult) -> RecipeResult:
+    """Return the candidate with its mean cross-validated errors, by kind of fold, among the facts of its damper."""
+    errors = {
+        f"cross-validation, {kind}": [abs(run.scores.nrmse_pp) for run in _runs(chosen, kind)]
+        for kind in (CONDITION, *chosen.by_kind)
+        if kind != NO_CURRENT
+    }
+    means = {kind: f"{100 * np.mean(each):.2f} %" for kind, each in errors.items() if each}
+    return replace(chosen, damper=replace(chosen.damper, provenance={**chosen.damper.provenance, **means}))
 
 
 def _with_sessions(chosen: RecipeResult, dataset: Dataset) -> tuple[RecipeResult, float | str]:
