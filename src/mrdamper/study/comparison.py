@@ -24,7 +24,7 @@ from mrdamper.identification.basis import Basis
 from mrdamper.physics.motion.sines import pure_sines
 from mrdamper.study.parallel import follow_each, identify_each
 from mrdamper.study.processes import several
-from mrdamper.study.recipe import IdentificationCache, Recipe, RecipeResult, StudyMethod, recipes
+from mrdamper.study.recipe import IdentificationCache, Recipe, RecipeResult, StudyMethod, recipes, recipes_of_models
 from mrdamper.study.usable_runs import UsableRuns
 from mrdamper.study.workflow import headline_of, table_of, with_unused_runs
 
@@ -92,7 +92,7 @@ def compare(
     ----------
     dataset : Dataset
     names : sequence of str
-        Models, each with its individual fits, or one of their other ways ("bouc-wen:joint"); default all but the
+        Models, each in all its ways ("bouc-wen"), or one of their ways ("bouc-wen:joint"); default all but the
         genetic ones.
     genetic : bool
         Include identification by genetic algorithm; of the named models, where some are named.
@@ -119,7 +119,7 @@ def compare(
     'utfsm'
     """
     begin = time.perf_counter()
-    chosen = recipes(names, genetic, method)
+    chosen = recipes(recipes_of_models(names), genetic, method)
     workers = jobs or os.cpu_count() or 1
     rigs = [_usable(dataset.rig(name)) for name in dataset.rigs]
     completed = [_completed(chosen, rig) for rig in rigs]

@@ -53,10 +53,10 @@ def compare(
     from mrdamper.study.recipe import recipes, recipes_of_models, study_method
 
     require_writable(out, "compare")
-    names = recipes_of_models([name.strip() for entry in models for name in entry.split(",") if name.strip()])
+    names = [name.strip() for entry in models for name in entry.split(",") if name.strip()]
     options = (parse_pairs(setting, "--set"), parse_gas(gas)) if setting or gas else ()
     method = study_method("paper", *options) if options else None
-    recipes(names, genetic, method)  # refuses what cannot be compared before anything is read
+    recipes(recipes_of_models(names), genetic, method)  # refuses what cannot be compared before anything is read
     dataset = load_dataset(data)
     with progress_on_stderr() as progress:
         result = comparing.compare(
