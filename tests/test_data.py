@@ -63,8 +63,23 @@ def test_dataset_refuses_twins_and_offers_near_names():
         Dataset((run(), run()))
     with pytest.raises(UnknownNameError, match="did you mean run_1"):
         _ = Dataset((run(id="run_1"),))["run_l"]
+    for split, near in (
+        ("validation", "did you mean validate"),
+        ("Train", "did you mean train"),
+        ("x", "known: train"),
+    ):
+        with pytest.raises(UnknownNameError, match=near):
+            Dataset((run(),)).split(split)
     with pytest.raises(RunError, match="no runs"):
         Dataset(())
+
+
+def test_a_rig_without_a_name_is_found_by_that_of_the_dataset():
+    dataset = Dataset((run(id="a", rig=""), run(id="b", rig="other")), "bench")
+    assert [one.id for one in dataset.rig("bench")] == [one.id for one in dataset.rig("")] == ["a"]
+    assert dataset.rig("bench").name == "bench"
+    with pytest.raises(UnknownNameError, match="known: bench, other"):
+        dataset.rig("xyz")
 
 
 def test_a_run_of_a_dataset_is_found_by_id_and_by_position():

@@ -10,6 +10,7 @@ from mrdamper.data.conditions import same_condition as same_condition
 from mrdamper.data.conditions import same_motion as same_motion
 from mrdamper.data.datasets import Dataset as Dataset
 from mrdamper.data.displayable import Displayable as Displayable
+from mrdamper.data.runs import SPLITS as SPLITS
 from mrdamper.data.runs import Run as Run
 from mrdamper.data.runs import Split as Split
 from mrdamper.data.runs import held_current as held_current

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mrdamper.data.displayable import Displayable
-from mrdamper.data.runs import Run, Split
+from mrdamper.data.runs import SPLITS, Run, Split
 from mrdamper.data.wording import counted
 from mrdamper.errors import RunError, UnknownNameError, check_fields, is_a, shown, validate_arguments
 
@@ -114,14 +114,17 @@ class Dataset(Displayable):
 
     @validate_arguments()
     def rig(self, name: str) -> Dataset:
-        """Return the runs of one rig."""
-        if name not in self.rigs:
-            raise UnknownNameError.of("rig", name, self.rigs)
-        return self.only([run for run in self.runs if run.rig == name], name=name or self.name)
+        """Return the runs of one rig; a rig without a name has that of the dataset. Raises `UnknownNameError`."""
+        rig = "" if name == self.name and name not in self.rigs else name
+        if rig not in self.rigs:
+            raise UnknownNameError.of("rig", name, (one or self.name for one in self.rigs))
+        return self.only([run for run in self.runs if run.rig == rig], name=rig or self.name)
 
     @validate_arguments()
     def split(self, split: Split) -> tuple[Run, ...]:
-        """Return the runs of one split."""
+        """Return the runs of one split; raises `UnknownNameError`."""
+        if split not in SPLITS:
+            raise UnknownNameError.of("split", split, SPLITS)
         return tuple(run for run in self.runs if run.split == split)
 
     @validate_arguments()

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, wraps
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeVar, get_args
 from weakref import ref
 
 import numpy as np
@@ -35,6 +35,7 @@ from mrdamper.errors import (
 K = TypeVar("K")
 T = TypeVar("T")
 Split = Literal["train", "validate"]
+SPLITS: tuple[str, ...] = get_args(Split)
 _MAX_NAME_CHARACTERS = 255
 
 
@@ -135,7 +136,7 @@ class Run(Displayable):
                     remedy="trim or resample the run",
                 )  # fmt: skip
         object.__setattr__(self, "further", {name: np.asarray(v, dtype=float) for name, v in self.further.items()})
-        if not is_a(self.split, str) or self.split not in ("train", "validate"):
+        if not is_a(self.split, str) or self.split not in SPLITS:
             raise RunError(f"split is {shown(self.split)}", where=self._where, remedy="use train or validate")
         object.__setattr__(self, "segments", tuple(self.segments) or ((0, size),))
         object.__setattr__(self, "notes", dict(self.notes))

@@ -41,6 +41,7 @@ def validate(
     """
     from mrdamper.dampers.model_file import load_model
     from mrdamper.dampers.sessions import RecordingTime, sessions_known
+    from mrdamper.data import SPLITS
     from mrdamper.data.atomic import require_writable
     from mrdamper.data.encoding import csv_text
     from mrdamper.identification.intervals import student
@@ -49,8 +50,8 @@ def validate(
     from mrdamper.study.validation import peak_band
     from mrdamper.study.validation import validate as score
 
-    if split not in (None, "train", "validate"):
-        raise UnknownNameError.of("split", str(split), ("train", "validate"))
+    if split not in (None, *SPLITS):
+        raise UnknownNameError.of("split", str(split), SPLITS)
     student(level, 1.0)  # refuses an invalid level
     require_writable(out)
     damper = load_model(model)
@@ -78,14 +79,15 @@ def validate(
 
 
 def _rig(dataset: Dataset, asked: str | None, of_model: str) -> Dataset:
-    if asked is None and of_model not in dataset.rigs and len(dataset.rigs) == 1:
-        asked = dataset.rigs[0]
-        names = [f"rig {rig!r}" if rig else "a rig without a name" for rig in (of_model, asked)]
-        typer.echo(f"the model is of {names[0]}; scoring the dataset's only rig, {names[1]}", err=True)
+    model = f"rig {of_model!r}" if of_model else "a rig without a name"
+    names = [rig or dataset.name for rig in dataset.rigs]
+    if asked is None and of_model not in dataset.rigs and len(names) == 1:
+        asked = names[0]
+        typer.echo(f"the model is of {model}; scoring the dataset's only rig, {asked!r}", err=True)
     if asked is None and of_model not in dataset.rigs:
         raise UnknownNameError(
-            f"the model's rig {of_model!r} is not in {dataset.name}",
-            remedy=f"give a dataset folder after the model, or --rig NAME: {', '.join(dataset.rigs)}",
+            f"the model is of {model}, which is not in {dataset.name}",
+            remedy=f"give a dataset folder after the model, or --rig NAME: {', '.join(names)}",
         )
     return dataset.rig(of_model if asked is None else asked)
 
