@@ -119,9 +119,10 @@ def test_a_report_with_controllers_side_by_side(tmp_path, monkeypatch):
 
 def test_the_constant_current_and_the_comparison_are_printed(tmp_path):
     save_model(joint_damper(), tmp_path / "model.json")
-    ask = ["simulate", "quarter-car", "--input", "bump", "--damper", str(tmp_path / "model.json")]
-    assert "passive, constant current 0 A\n" in CliRunner().invoke(application(), ask).output
-    assert "Quarter car, without dampers\n" in CliRunner().invoke(application(), [*ask, "--without-damper"]).output
+    bare = ["simulate", "quarter-car", "--input", "bump"]
+    assert "Quarter car, without dampers\n" in CliRunner().invoke(application(), [*bare, "--without-damper"]).output
+    ask = [*bare, "--damper", str(tmp_path / "model.json")]
+    assert "passive, constant current 0 A\npeak values:\n" in CliRunner().invoke(application(), ask).output
     given = [*ask, "--current", "0.3", "--compare", "skyhook-continuous", "--out", str(tmp_path / "out")]
     printed = CliRunner().invoke(application(), given).output
     assert "passive, constant current 0.3 A\n" in printed
@@ -137,6 +138,7 @@ def test_options_that_contradict_each_other(tmp_path):
         (["--damper", str(tmp_path / "model.json"), "--volts", "1", "--current", "1"], "--current beside"),
         (["--damper", str(tmp_path / "model.json"), "--control", "skyhok"], "skyhook"),
         (["--damper", str(tmp_path / "model.json"), "--current", "inf"], "--current inf"),
+        (["--without-damper", "--damper", "m.json"], "E_OPTION"),
         (["--without-damper", "--step", "nan"], "E_STEP"),
         (["--without-damper", "--step", "0"], "E_STEP"),
         (["--without-damper", "--step", "1e-12"], "E_STEP"),

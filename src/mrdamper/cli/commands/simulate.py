@@ -58,6 +58,8 @@ def simulate(
 
     _refuse_no_folder(out, compare)
     loaded, shaken_by = load_system(system), load_input(*parse_named(source, "--input"), time_scale=time_scale)
+    if without and damper:
+        raise InputError("--damper together with --without-damper", remedy="give one of them", code="E_OPTION")
     dampers = {} if without else _dampers(loaded, damper, system)
     highest = _amperes(current, volts, dampers)
     controller, others = _controller(control, highest), [_controller(text) for text in _all_of(compare or [])]
@@ -252,7 +254,7 @@ def _print_rows(done: Simulation, *ends: Mapping[str, Floats]) -> None:
 def _print_peaks(done: Simulation) -> None:
     from mrdamper.data.wording import number
 
-    typer.echo(done.headline)
+    typer.echo(f"{done.headline}\npeak values:")
     _print_rows(done, done.peaks)
     typer.echo(
         f"step {1e3 * done.step:.3g} ms; the last halving changed a peak value by {number(100 * done.halving, 2)} %; "

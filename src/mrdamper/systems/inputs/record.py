@@ -51,7 +51,7 @@ class RecordedInput(Input):
 def load_record(path: str | Path, time_scale: float = 1.0) -> RecordedInput:
     """Read a CSV with time_s and acceleration_m_s2, acceleration_g (9.81 m/s²) or height_m; raises `InputError`."""
     path = Path(path)
-    table = read_table(path, "give a CSV with time_s and acceleration_m_s2")
+    table = read_table(path, "give a CSV with time_s, and acceleration_m_s2 (ground) or height_m (road)")
     table = table.rename({column: column.strip().lstrip("\ufeff") for column in table.columns})
     present = [name for name in _COLUMNS if name in table.columns]
     if len(present) > 1:
@@ -59,7 +59,7 @@ def load_record(path: str | Path, time_scale: float = 1.0) -> RecordedInput:
     if "time_s" not in table.columns or not present:
         missing = f"no column {'time_s' if present else ' or '.join(_COLUMNS)} (found {', '.join(table.columns)})"
         likely = any(c.lower().startswith(("time", "t_", "acc", "a_", "height")) for c in table.columns)
-        remedy = "state the unit in the name: time_s, and acceleration_m_s2 or acceleration_g"
+        remedy = "state the unit in the name: time_s; acceleration_m_s2 or acceleration_g (ground), height_m (road)"
         raise (UnitError if likely else ColumnError)(missing, where=str(path), remedy=remedy)
     columns = {}
     for name in ("time_s", present[0]):
