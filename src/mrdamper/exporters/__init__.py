@@ -6,7 +6,7 @@ from pathlib import Path
 
 from mrdamper.dampers.base import Damper
 from mrdamper.discovery import Registry
-from mrdamper.errors import validate_arguments
+from mrdamper.errors import UnknownNameError, validate_arguments
 from mrdamper.exporters.base import Exporter, Written, identifier, write_export
 
 __all__ = ["Exporter", "Written", "all_exporters", "export", "exporter"]
@@ -14,7 +14,14 @@ __all__ = ["Exporter", "Written", "all_exporters", "export", "exporter"]
 
 _registry: Registry[Exporter] = Registry("mrdamper.exporters", Exporter, "export format")  # type: ignore[type-abstract]
 all_exporters = _registry.all
-exporter = _registry.type_named
+
+
+def exporter(name: str) -> type[Exporter]:
+    """Return the export format of a name; raises `UnknownNameError` with all formats."""
+    if (formats := all_exporters()).get(name) is None:
+        remedy = f"known: {', '.join(formats)}; Simulink takes fmu or c"
+        raise UnknownNameError(f"no export format is called {name!r}", remedy=remedy)
+    return formats[name]
 
 
 @validate_arguments()

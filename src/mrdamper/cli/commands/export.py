@@ -22,7 +22,7 @@ app = typer.Typer()
 def export(
     model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
     to: str = typer.Option(..., help="c, fmu, page, latex, markdown, table, adams, tydex, dyna4."),
-    out: Path = typer.Option(..., help="Folder; for fmu, page, latex and markdown a file."),
+    out: Path = typer.Option(..., help="Folder; for fmu, page, latex, markdown, tydex and dyna4 a file."),
     name: str | None = typer.Option(None, help="Name of files and symbols; default: the rig."),
     inverse: bool = typer.Option(
         False, "--inverse", help="For c and fmu: the inverse model, current from demanded force."
