@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.command import mrdamper
+from typer.testing import CliRunner
 
 from mrdamper.cli import application
 from mrdamper.cli.commands import validate
@@ -222,6 +223,7 @@ def test_bad_input_is_one_line_and_exit_two(model, tmp_path):
         (("predict", tmp_path / "newer.json", "--current", 1), "update mrdamper"),
         (("predict", model, "--current", 1, "--frequency", 0, "--amplitude", 10), "--frequency 0; give a positive"),
         (("predict", model, "--motion", tmp_path / "none.csv"), "no such file"),
+        (("export", model, "--to", "matlab", "--out", tmp_path / "x"), "Simulink takes fmu or c"),
         (("validate", model, "--rig", "utfms"), "did you mean utfsm"),
         (("validate", model, "--split", "test"), "known: train, validate"),
     ]
@@ -284,6 +286,12 @@ def test_a_prediction_is_drawn_and_another_kind_of_file_is_refused(model, tmp_pa
     assert refused.returncode == 2
     assert "[E_OUTPUT]" in refused.stderr
     assert not other.exists()
+
+
+@pytest.mark.parametrize("text", ["0,5", "0.5A"])
+def test_a_number_with_a_comma_or_a_unit_is_refused_with_the_way_to_write_it(text):
+    got = CliRunner().invoke(application(), ["predict", "m.json", "--current", text])
+    assert (got.exit_code, "with a decimal point and without a unit" in got.stderr) == (2, True)
 
 
 def test_a_rig_without_a_name_is_called_so(capsys):

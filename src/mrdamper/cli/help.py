@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from typer import BadParameter
 from typer.core import TyperCommand, TyperGroup
 
 _GROUPS = {
@@ -36,6 +37,15 @@ class CommandGroups(TyperGroup):
 
 class OptionGroups(TyperCommand):
     """A command whose options stand under "Required", "Options" (or a panel of their own) and "Output"."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the arguments; the message of a text that is no number states how one is written."""
+        try:
+            return super().parse_args(ctx, args)
+        except BadParameter as error:
+            if "valid number" in error.message or "valid float" in error.message:  # of versions of typer
+                error.message = "no number; write it with a decimal point and without a unit: 0.5"
+            raise
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write arguments, then the options group by group."""
