@@ -123,8 +123,9 @@ class Limits:
         least = self.opening + min(self.minutes(c) for c in allowed)
         if not (math.isfinite(hours) and hours * 60 >= least):
             raise bad_limits(
-                f"{hours:g} hours are {60 * hours:g} minutes",
-                f"a session with its shortest record takes {least:.1f} minutes with setting up; give as many at least",
+                f"the rig time is {hours:g} hours",
+                f"a session with its shortest record takes {least:.1f} minutes with setting up; give at least "
+                f"{math.ceil(least / 0.6) / 100:g} hours",
             )
         return allowed
 
