@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+_MAX_SHOWN = 60  # characters of a user's value in a message
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
@@ -230,9 +231,10 @@ def require_positive(kind: type[InputError], where: str = "", **values: object) 
 def shown(value: object) -> str:
     """Whatever a user gave, in the first line of a few characters; a number of thousands of digits has no text."""
     try:
-        return f"{value:.10g}" if isinstance(value, float) else f"{value!r}".partition("\n")[0][:60]
+        text = f"{value:.10g}" if isinstance(value, float) else f"{value!r}".partition("\n")[0]
     except ValueError:
         return "a number of thousands of digits"
+    return text if len(text) <= _MAX_SHOWN else f"{text[: _MAX_SHOWN - 1]}…"
 
 
 def listed(names: Sequence[str], most: int) -> str:
