@@ -307,6 +307,16 @@ def test_currents_that_are_not_taken_are_named_where_one_is_missing(tmp_path, he
     assert refusal.error.remedy.startswith("if it is the coil's, set [channels.current]") == (not head)
 
 
+@pytest.mark.parametrize("ends", ["force_low_N,force_high_N", "force_lower_N,force_upper_N"])
+def test_a_predicted_force_is_not_taken_for_a_measured_one(tmp_path, ends):
+    names = f"time_s,displacement_mm,force_N,{ends},current_A"
+    table(tmp_path / "a.csv", [names], T, X, force(0.5), force(0.5) - 9, force(0.5) + 9, 0.5 + 0 * T)
+    (refusal,) = import_files([tmp_path]).refusals
+    assert refusal.error.code == "E_COLUMN"
+    (record,) = import_files([tmp_path], parse_profile('[channels.force]\ncolumn = "force_N"\n')).records
+    assert record.force == pytest.approx(force(0.5), abs=0.01)
+
+
 def test_a_number_that_is_not_taken_for_the_current_is_one_answer_away(tmp_path):
     """The refusal names it and its line of the profile, and the written profile holds that line as a comment."""
     for name, current in (("a", 0.5), ("b", 1.0)):

@@ -35,6 +35,7 @@ _TOTAL = re.compile(r"total|absolut|gesamt|cumulat|kumul", re.IGNORECASE)
 _OF_SENSORS = ("voltage", "count", "ratio", "dimensionless")  # which a calibration leads from
 _COUNTS = ("counts", *column_names.TABLES["unit_names"]["counts"])
 _PHASES = (frozenset("UVW"), frozenset("RST"), frozenset(("L1", "L2", "L3")))  # of a motor, at the end of a name
+_ENDS = (("low", "high"), ("lower", "upper"))  # of an interval, at the end of a name
 _INDEX, _MEASURED = words("sample"), words("measured")
 _TIMES = re.compile(r"(?i)(?<!\w)multipl(?:y|ie[ds]?|ier|iz|ic|ik)\w*")  # no multiple, no multiplexer
 _CONVERTER = re.compile(r"(?i)(?<![a-z])(?:adc|counts?|raw|cnts?)(?![a-z])")  # of a converter
@@ -71,6 +72,7 @@ def assign(table: RawTable, profile: Profile) -> dict[str, Assigned]:
         with _noted(problems):
             if role != "time" or not missing:
                 _refuse_two_values(table, role, column, profile)
+            _refuse_interval(table, role, column, profile)
             entry = _convert(table, role, column, profile, asks_current=bool(problems) and not stated)
             assigned |= {} if entry is None else {role: entry}
     if not problems and "time" in assigned and "time" not in profile.channels:
@@ -436,6 +438,16 @@ def _convert(table: RawTable, role: str, column: int, profile: Profile, asks_cur
     return Assigned(column, header.name, unit, factor, shift + 0.0, 1e-3 * channel.delay_ms, sign)
 
 
+def _refuse_interval(table: RawTable, role: str, column: int, profile: Profile) -> None:
+    """Refuse a force with the ends of its interval beside it, force_low_N and force_high_N: it was predicted."""
+    name, names = table.headers[column].name, {header.name.casefold() for header in table.headers}
+    ends = ({f"{name}_{low}".casefold(), f"{name}_{high}".casefold()} for low, high in _ENDS)
+    if role == "force" and profile.channel(role).column is None and any(own <= names for own in ends):
+        problem = f"column {table.names[column]!r} has the ends of an interval beside it: a prediction, not measured"
+        remedy = f"leave the file out, or if it was measured set [channels.force] column = {toml(table.names[column])}"
+        raise _refusal(ColumnError, table, problem, f"{remedy} in a profile")
+
+
 def _refuse_volts_beside(table: RawTable, role: str, profile: Profile) -> None:
     """Refuse a unit that only the profile states where a line beside the columns has cells in volts: Y units, V."""
     only_stated = (profile.file.names or profile.channel(role).unit) and not table.columns(dimension="voltage")
@@ -490,7 +502,7 @@ def _unit_problem(table: RawTable, role: str, column: int, unit: str) -> UnitErr
         force = "kgf" if parsed.factor == 1 else "lbf"
         remedy = f'if the force of that weight is meant, set [channels.force] unit = "{force}" in a profile'
     elif parsed.dimension not in _OF_SENSORS:
-        remedy += ", or name another column"
+        remedy += ", scale = 1 if it is in that unit already, or name another column"
     problem = f"{named} is in {unit}, which is no unit of {DIMENSION[role]}"
     return _refusal(UnitError, table, problem, remedy, "E_UNITS_DIMENSION")
 
