@@ -38,7 +38,7 @@ def test_progress_is_told_on_the_way_and_the_result_at_the_end():
     assert job.state == "done"
     assert job.result == {"result": 6}
     assert shares == sorted(shares)
-    assert len(set(shares)) > 2
+    assert any(0 < share < 1 for share in shares)
 
 
 @pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="no list of open descriptors here")
