@@ -94,6 +94,11 @@ def test_every_entry_is_judged_on_the_same_runs(compared, dataset):
         assert {i.run_id for i in entry.identifications} in (train, set())
 
 
+def test_a_models_name_stands_for_all_its_ways_and_its_individual_fits_have_one():
+    assert recipes_of_models(["bouc-wen"]) == ["bouc-wen", "bouc-wen:joint", "bouc-wen:current"]
+    assert recipes_of_models(["bouc-wen:individual", "kernel"]) == ["bouc-wen", "kernel"]
+
+
 def test_one_process_gives_the_same_bits(compared, dataset):
     alone = compare(dataset, ["bouc-wen", "dahl:joint", "kernel"], jobs=1)
     together = {entry.recipe.name: entry for entry in compared.rigs[0].entries}

@@ -132,7 +132,7 @@ def test_from_drop_to_report(page, small_rig, tmp_path, shoot):
     open_tab(page, "Compare")
     page.locator("input[name=compared]").first.wait_for()
     for box in page.locator("input[name=compared]").all():
-        box.set_checked(box.get_attribute("value") in ("bingham", "smooth-bingham"))
+        box.set_checked(box.get_attribute("value") in ("bingham:individual", "smooth-bingham"))
     page.get_by_role("button", name="Compare", exact=True).click()
     page.locator("#compare-run").wait_for()
     page.locator("section[aria-label='Force over velocity'] .js-line").first.wait_for(state="attached")

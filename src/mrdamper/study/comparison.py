@@ -92,8 +92,8 @@ def compare(
     ----------
     dataset : Dataset
     names : sequence of str
-        Models, each in all its ways ("bouc-wen"), or one of their ways ("bouc-wen:joint"); default all but the
-        genetic ones.
+        Models, each in all its ways ("bouc-wen"), or one of their ways ("bouc-wen:individual", "bouc-wen:joint");
+        default all but the genetic ones.
     genetic : bool
         Include identification by genetic algorithm; of the named models, where some are named.
     method : StudyMethod, optional

@@ -366,11 +366,18 @@ def recipes(names: Sequence[str] = (), genetic: bool = False, method: StudyMetho
     return [by_name[name] for name in (names or by_name) if names or genetic or not by_name[name].on_request]
 
 
+INDIVIDUAL = ":individual"  # end of the name of a model's individual fits alone
+
+
 def recipes_of_models(names: Sequence[str]) -> list[str]:
-    """Return the names of all recipes of some models, as a study follows them; the name of a recipe is kept."""
+    """Return the names of all recipes of some models, as a study follows them; the name of a recipe is kept.
+
+    The individual fits alone of a model with other ways are called "bouc-wen:individual".
+    """
     by_name = catalogue()
     chosen = [
-        [r.name for r in by_name.values() if name == r.name or (name == r.model and not r.on_request)] or [name]
+        [r.name for r in by_name.values() if name == r.name or (name == r.model and not r.on_request)]
+        or [name.removesuffix(INDIVIDUAL)]
         for name in names
     ]
     return list(dict.fromkeys(name for some in chosen for name in some))

@@ -14,7 +14,7 @@ from pydantic import BaseModel, Field
 from mrdamper.data.encoding import csv_text, finite
 from mrdamper.report.comparison import summary_rows, write_comparison
 from mrdamper.study.comparison import Comparison, compare
-from mrdamper.study.recipe import STUDIED, WHOLE_DAMPER, RecipeResult, recipes
+from mrdamper.study.recipe import INDIVIDUAL, STUDIED, WHOLE_DAMPER, Recipe, RecipeResult, recipes, recipes_of_models
 from mrdamper.web.curves import measured_cycle, measured_window, predicted_on_run
 from mrdamper.web.responses import archive, download, frame
 from mrdamper.web.rig_table import screen_condition
@@ -33,9 +33,14 @@ class CompareRequest(BaseModel, extra="forbid"):
 @router.get("/choices")
 def choices(session: OpenSession) -> list[dict[str, Any]]:
     """List the models that can be compared; those of a study are selected at first."""
+
+    def name_of(recipe: Recipe) -> str:
+        alone = recipes_of_models([recipe.name]) == [recipe.name]  # else the name stands for other ways, too
+        return recipe.name if alone else f"{recipe.name}{INDIVIDUAL}"
+
     return [
         {
-            "name": c.name, "title": ", ".join(filter(None, (c.title or c.source, c.way))), "source": c.source,
+            "name": name_of(c), "title": ", ".join(filter(None, (c.title or c.source, c.way))), "source": c.source,
             "slow": bool(c.basis and c.basis.costly), "studied": c.model in (*STUDIED, *WHOLE_DAMPER),
         }
         for c in recipes()
