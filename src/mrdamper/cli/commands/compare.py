@@ -26,7 +26,8 @@ def compare(
     out: Path = typer.Option(..., help="Folder for comparison.html, tables and figures."),
     models: list[str] = typer.Option(
         [],
-        help="Only this model in all its ways (bouc-wen), or one of them (bouc-wen:individual, bouc-wen:joint); may be repeated.",
+        help="Only this model in all its ways (bouc-wen), or one of them (bouc-wen:individual, bouc-wen:joint); "
+        "may be repeated.",
     ),
     genetic: bool = typer.Option(
         False, "--genetic", help="Also identify by genetic algorithm, 60 generations (minutes)."
