@@ -60,10 +60,12 @@ def profile_template(paths: Sequence[str | Path], profile: Profile) -> tuple[str
         except InputError as error:
             problems = getattr(error, "errors", (error,))
     refusals = import_files(paths, guess).refusals
-    unset, names_tests = _open_keys(paths, guess, [*problems, *(r.error for r in refusals)], columns)
-    refusals = names_tests or refusals
+    unset, without_current = _open_keys(paths, guess, [*problems, *(r.error for r in refusals)], columns)
+    refusals = without_current or refusals
     if any(CHANNEL_RIGHT in refusal.error.remedy for refusal in refusals):
-        guess = guess.model_copy(update={"current": profile.current})  # the names' is wrong where the channel is right
+        guess = guess.model_copy(
+            update={"current": profile.current}
+        )  # the pattern of the names contradicts the channel
     missing = _missing_currents(refusals if guess.current is None else (), columns)
     text = profile_text(guess, unset) + _alternatives(columns, {}) + missing
     return text, list(dict.fromkeys(map(str, problems)))
