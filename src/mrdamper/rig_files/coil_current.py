@@ -68,7 +68,7 @@ def current_of(
         lines = [line for line in table.remarks if line not in table.titles]
         statements = _set_points(table, rows) or conditions.stated_in_titles(lines) or _folders(table, path)
     names = [profile.channel("current").column, *(table.names[i] for i in table.columns("current"))]
-    stated = _agreed(statements, channel, where, str(next(filter(None, names), "")))
+    stated = _agreed(statements, channel, where, str(next(filter(None, names), "its name")))
     if stated is not None and channel is None and all(s.whence.startswith("the line ") for s in statements):
         _refuse_contradicted_line(table, stated, rows, where)
     if stated is None or (channel is not None and not stated_by_profile):
@@ -170,13 +170,12 @@ def require_current(record: Record, path: Path = Path()) -> Record:
     reason, *use = _USE.split((*reasons, *near, _NONE)[0], maxsplit=1)
     if use or (reason.startswith(NO_CHANNEL) and "may both" not in reason):
         first = f"{(use or [_CALIBRATION])[0]}; else "
+    last = "" if first else '; or [channels.current] column = "..."'
     raise ColumnError(
         reason,
         where=Path(record.provenance.get("file", record.id)).name,
         remedy=f"{first}write the currents into tests.csv (--write-tests), or set one of these in a profile: [current] "
-        f'value = 0.5 of all tests, values = {{{value}}}, pattern = "*_{{current}}A_*" and unit = "A"'
-        + '; or [channels.current] column = "..."'
-        * (not first),
+        f'value = 0.5 of all tests, values = {{{value}}}, pattern = "*_{{current}}A_*" and unit = "A"{last}',
         code="E_CURRENT_MISSING",
     )
 

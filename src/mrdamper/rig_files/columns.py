@@ -444,7 +444,7 @@ def _refuse_interval(table: RawTable, role: str, column: int, profile: Profile) 
     ends = ({f"{name}_{low}".casefold(), f"{name}_{high}".casefold()} for low, high in _ENDS)
     if role == "force" and profile.channel(role).column is None and any(own <= names for own in ends):
         problem = f"column {table.names[column]!r} has the ends of an interval beside it: a prediction, not measured"
-        remedy = f"leave the file out, or if it was measured set [channels.force] column = {toml(table.names[column])}"
+        remedy = f"omit the file, or if it was measured set [channels.force] column = {toml(table.names[column])}"
         raise _refusal(ColumnError, table, problem, f"{remedy} in a profile")
 
 

@@ -63,9 +63,8 @@ def profile_template(paths: Sequence[str | Path], profile: Profile) -> tuple[str
     unset, without_current = _open_keys(paths, guess, [*problems, *(r.error for r in refusals)], columns)
     refusals = without_current or refusals
     if any(CHANNEL_RIGHT in refusal.error.remedy for refusal in refusals):
-        guess = guess.model_copy(
-            update={"current": profile.current}
-        )  # the pattern of the names contradicts the channel
+        # The pattern of the names contradicts the channel.
+        guess = guess.model_copy(update={"current": profile.current})
     missing = _missing_currents(refusals if guess.current is None else (), columns)
     text = profile_text(guess, unset) + _alternatives(columns, {}) + missing
     return text, list(dict.fromkeys(map(str, problems)))
